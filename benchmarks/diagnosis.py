@@ -1,12 +1,13 @@
 """How long a diagnosis takes: data sets of 18 records of independent simulators, one after another.
 
-    python benchmarks/diagnosis.py [--one-core] [--arms] [--json FILE]
+    python benchmarks/diagnosis.py [--one-core] [--arms] [--wrong] [--json FILE]
 
 Wall time with all cores of the whole command, `picchio diagnose ROBOT --data CAMPAIGN --json -`, as
 a user gets it: its start, the records read, the verdict, and the life without and with the causes.
 Effects alone, pairs, nothing wrong, as `blind_trial.py` draws them, at 40 dB on the 3-DoF arm.
 `--one-core` adds the same on one core, in turns, and the ratio; `--arms` a single and a null on the
-UR10 and the Kinova Gen3. Nothing else should run meanwhile.
+UR10 and the Kinova Gen3; `--wrong` takes worlds that are off by all tolerances in their place, a
+six-joint arm and a force that is read among them. Nothing else should run meanwhile.
 """
 
 from __future__ import annotations
@@ -39,6 +40,20 @@ SINGLES = (
 )  # fmt: skip
 PAIRS = (0, 8, 16, 24, 32, 40, 48)
 SALT = 1
+# Where all is a little wrong: robot, what is hidden, whether the force is read.
+WRONG = (
+    (ARM, None, False), (ARM, "force_amplitude", False), (ARM, "joint_stiffness", False),
+    (ARM, None, True), (ARM, "payload", True), (ARM, "joint_stiffness", True),
+    ("fanuc_r2000ic", None, False), ("fanuc_r2000ic", "payload", False),
+    ("fanuc_r2000ic", "joint_stiffness", False),
+)  # fmt: skip
+
+
+def wrong() -> Iterator[dict[str, Any]]:
+    for robot, effect, read in WRONG:
+        kind = {"kind": "single", "effect": effect} if effect else {"kind": "null"}
+        sensors = {"sensors": ["accelerometer", "deflection", "force"]} if read else {}
+        yield {"robot": robot, "snr": 40, "draw": 90001, "mismatch": 1, **kind, **sensors}
 
 
 def cases(arms: bool) -> Iterator[dict[str, Any]]:
@@ -79,16 +94,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--one-core", action="store_true", help="the same on one core, too")
     parser.add_argument("--arms", action="store_true", help="the UR10 and the Gen3, too")
+    parser.add_argument("--wrong", action="store_true", help="all a little wrong, in their place")
     parser.add_argument("--json", type=Path, help="write the figures here")
     given = parser.parse_args()
     timed({"robot": ARM, "kind": "null", "snr": 40, "draw": 10**6})  # compiles, or loads
     rows = []
-    print(f"{'case':44} {'s':>6}" + (f" {'one core':>9} {'ratio':>6}" if given.one_core else ""))
-    for case in cases(given.arms):
+    print(f"{'case':76} {'s':>6}" + (f" {'one core':>9} {'ratio':>6}" if given.one_core else ""))
+    for case in wrong() if given.wrong else cases(given.arms):
         took, verdict, right = timed(case)
         row = {"case": trial.name_of(case), "kind": case["kind"], "robot": case["robot"]}
         row |= {"seconds": took, "verdict": verdict, "right": right}
-        line = f"{row['case']:44} {took:6.1f}"
+        line = f"{row['case']:76} {took:6.1f}"
         if given.one_core:
             row["one_core_seconds"] = timed(case, one_core=True)[0]
             line += f" {row['one_core_seconds']:9.1f} {row['one_core_seconds'] / took:6.2f}"
@@ -96,7 +112,8 @@ def main() -> None:
         print(line, f" {verdict}" + ("" if right else " (wrong)"), flush=True)
     for kind in ("single", "pair", "null"):
         seconds = [r["seconds"] for r in rows if r["kind"] == kind and r["robot"] == ARM]
-        print(f"{kind}: median {median(seconds):.1f} s, longest {max(seconds):.1f} s")
+        if seconds:
+            print(f"{kind}: median {median(seconds):.1f} s, longest {max(seconds):.1f} s")
     if given.json:
         with atomic_write(given.json) as stream:
             json.dump({"cores": os.cpu_count(), "cases": rows}, stream, indent=1)

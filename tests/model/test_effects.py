@@ -394,12 +394,16 @@ def scales(problem):
 
 
 @pytest.mark.parametrize("name", [n for n, kind in catalogue().items() if kind.shows(motion=False)])
-def test_what_is_tried_of_an_effect_changes_what_is_read(problem, scales, name):
+def test_what_is_tried_of_an_effect_changes_what_is_read(problem, scales, worlds, name):
     """At one target at least, by more than noise: a cable holds no link that never moves.
 
     Of what is drawn anew in every record, one step of its last number.
     """
     kind = effect_class(name)
+    if kind.takes == "recorded":
+        read = worlds.make(records=3, programmed=False, blend=1.0, sampling=2000.0,
+                           sensors=("accelerometer", "deflection", "force"))  # fmt: skip
+        problem = Problem(problem.robot, read[0])
     plain = problem.residuals(())
 
     def change(effect):

@@ -86,10 +86,6 @@ def test_a_recorded_force_drives_the_prediction_at_its_own_time(worlds):
             read = np.array([record[name] for name in names])
             left = read - np.array([found[name] for name in names])
             assert np.linalg.norm(left) < 0.01 * np.linalg.norm(read)
-    # Known as well as a sensor's gain; where the campaign states it, as it says.
-    for given, expected in ({}, 0.01), ({"sensor_gain": 0.02}, 0.02), ({"force": 0.03}, 0.03):
-        stated = Campaign.from_records(campaign.records, robot="fanuc_like_3dof", tolerance=given)
-        assert stated.tolerance.force == expected
 
 
 def test_what_the_model_leaves_grows_with_the_square_of_the_force_or_faster(worlds):

@@ -68,6 +68,7 @@ def noise(shape, rng, colour=0.2, memory=0.7):
     return np.sqrt(1.0 - colour) * white + np.sqrt(colour) * slow[50:]
 
 
+_ZERO = 0.01  # of the programmed force, by which a load cell that stands for it is off at rest
 NOT_OF_THE_PLAN = (
     "snr_db",
     "folder",
@@ -136,7 +137,8 @@ def make(
             deviations, and the campaign says so; else all is normal, and it says nothing: the
             format's tolerances hold.
         only: keys of `[tolerance]` that are off, with a mismatch; all where None.
-        programmed: whether the campaign states the blows; else the force is read, as "force".
+        programmed: whether the campaign states the blows; else the force is read, as "force", by a
+            load cell whose zero is off by a few newtons.
         **options: `strength`, and of `plan.make`: hits, period, width, sampling, force, offset, ...
 
     Returns:
@@ -160,12 +162,15 @@ def make(
     times = plan.times()
     levels = noise_levels(data, times, snr_db)
     rng = np.random.default_rng([seed, 3])
+    zero = np.random.default_rng([seed, 6]).normal(0.0, _ZERO * plan.force)
     taken = []
     for i, (shot, record) in enumerate(zip(plan.shots, data, strict=True)):
         arrays = {}
         for group in groups:
             level = levels[group]
             read = record[group] + level * noise(record[group].shape, rng)
+            if group == "force" and not programmed:
+                read = read + zero
             if level > 0.0:
                 read = np.round(read / (level / 8.0)) * (level / 8.0)
             arrays |= dict(zip(channels(group, nominal), read.T, strict=True))

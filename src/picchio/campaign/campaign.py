@@ -88,15 +88,8 @@ class Campaign:
 
     @property
     def tolerance(self) -> Tolerance:
-        """Standard deviations of the nominal values.
-
-        A force that every record measures is known as well as a sensor's gain, if `force` is not
-        stated.
-        """
-        stated, hit = self.table.tolerance, [r for r in self.records if r.kind == "percussion"]
-        if "force" in stated.model_fields_set or not hit or any(r.blows() for r in hit):
-            return stated
-        return stated.model_copy(update={"force": stated.sensor_gain})
+        """Standard deviations of the nominal values."""
+        return self.table.tolerance
 
     @property
     def controller(self) -> Mapping[str, Any] | None:

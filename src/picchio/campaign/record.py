@@ -200,10 +200,15 @@ class Record:
         return self.excitation.hits or (1 if self.test == "tap" else None)
 
     @property
-    def steady(self) -> bool:
-        """Whether the blows never end. A force that is only recorded begins from rest."""
+    def reads_force(self) -> bool:
+        """Whether it states no blows: its channel `force` has what the tool did."""
         stated = self.excitation.blows.model_dump(exclude_none=True)
-        return self.kind == "percussion" and self.hits is None and bool(stated)
+        return self.kind == "percussion" and not stated
+
+    @property
+    def steady(self) -> bool:
+        """Whether the blows never end. A force that is only read begins from rest."""
+        return self.kind == "percussion" and self.hits is None and not self.reads_force
 
     def blows(self) -> Excitation | None:
         """The programmed blow train; None where none is stated.
@@ -211,10 +216,24 @@ class Record:
         Raises:
             InputError: a key of the excitation is missing or out of range.
         """
-        if self.kind != "percussion" or not self.excitation.blows.model_dump(exclude_none=True):
+        if self.kind != "percussion" or self.reads_force:
             return None
         file = self.folder / "campaign.toml" if self.folder is not None else None
         return self.excitation.blows.build(file=file, key=f"{self.source.key}.excitation")
+
+    def acting(self) -> tuple[Excitation, int | None]:
+        """What acts on the robot, and how many of it: the blows as stated, or once what was read.
+
+        Raises:
+            InputError: as of `blows`; neither is there.
+        """
+        from picchio.excitation.measured import MeasuredForce
+
+        stated = self.blows()
+        if stated is not None:
+            return stated, self.hits
+        read = self.read(["force"])
+        return MeasuredForce.from_start(read[TIME], read["force"]), 1
 
     @property
     def channels(self) -> tuple[str, ...]:

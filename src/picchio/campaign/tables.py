@@ -125,7 +125,7 @@ class Tolerance(StrictModel):
         stiffness: 1, of each joint; drawn once a campaign, as all where nothing else is said.
         damping_ratio: 1, of all modes together.
         damping_by_mode: 1, of each mode by itself; once a pose.
-        force: 1, of the blows; as `sensor_gain` if not stated where all records read them.
+        force: 1, of the blows.
         link_mass: 1, of each link.
         link_com: m, of each link's centre of mass along each axis.
         link_inertia: 1, of each link's moments of inertia.
@@ -135,7 +135,7 @@ class Tolerance(StrictModel):
         tool_point: m, of where the force acts, along each axis.
         sensor_angle: rad, about each axis of an accelerometer and the like.
         sensor_position: m, of its place along each axis.
-        sensor_gain: 1, of each channel group.
+        sensor_gain: 1, of each channel group, and of a force that is read in place of stated blows.
         blow_force: 1, from blow to blow.
         blow_time: s, from blow to blow.
         rise_time: s, of how long a blow's force takes to rise and to fall.

@@ -111,6 +111,6 @@ def begin(robot: FlexibleRobot, campaign: Campaign) -> Begun | None:
         spreads=dict(robot.spreads) | {one.name: one for one in ratios},
     )
     size = np.clip(_SURER * found.stiffness_std, _STIFFNESS, UNKNOWN)
-    stated = Hypothesis.baseline(robot, campaign.tolerance)
+    stated = Hypothesis.nominal(problem)
     nrmse = holdout_gain(problem, stated, stated, *held_out(problem)[0]).baseline_nrmse
     return Begun(with_stiffness(damped, np.log(found.stiffness), np.diag(size**2)), found, nrmse)

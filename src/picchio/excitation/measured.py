@@ -15,8 +15,10 @@ from picchio.excitation.excitation import Excitation
 from picchio.excitation.piecewise import PiecewiseForce
 
 # Samples of the quiet time from which a force sensor's noise is known, and how many of its standard
-# deviations a force is above.
+# deviations a force is above. These are half of what lies between two quantiles, which a first blow
+# that begins early does not move.
 _QUIET, _NOISE = 20, 5.0
+_BETWEEN = (0.0228, 0.5, 0.9772)  # two standard deviations to either side
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +107,8 @@ class MeasuredForce(Excitation):
         """The force of a record from t = 0 on, which may lie between two of its samples.
 
         Where it does not rise out of the noise that the quiet time before shows, there is none: the
-        sensor's noise would shake the model for as long as the record lasts.
+        sensor's noise would shake the model for as long as the record lasts. What it reads then is
+        its zero.
 
         Args:
             time: (m,) s, ascending; before 0 it is quiet.
@@ -113,8 +116,8 @@ class MeasuredForce(Excitation):
         """
         quiet = samples[time < -1e-12]
         if quiet.size >= _QUIET:
-            rest = float(quiet.mean())
-            acts = np.abs(samples - rest) > _NOISE * float(quiet.std())
+            low, rest, high = np.quantile(quiet, _BETWEEN)
+            acts = np.abs(samples - rest) > _NOISE * (high - low) / 4.0
             beside = np.convolve(acts, np.ones(3), "same") > 0.0  # where a blow begins and ends
             samples = np.where(beside, samples - rest, 0.0)
         after = time > 1e-12

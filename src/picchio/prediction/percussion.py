@@ -544,21 +544,14 @@ def _warn_of_blows_beyond(record: Record) -> None:
 def _blows(record: Record) -> Blows:
     direction = record.direction
     assert direction is not None
-    excitation = record.blows()
-    if excitation is None:
-        from picchio.excitation.measured import MeasuredForce
-
-        data = record.read(["force"])
-        excitation = MeasuredForce.from_start(data["time"], data["force"])
-        return Blows.of(excitation, 1, direction).change(recorded=True)
-    return Blows.of(excitation, record.hits, direction)
+    return Blows.of(*record.acting(), direction).change(recorded=record.reads_force)
 
 
 def _channels(record: Record, robot: FlexibleRobot) -> tuple[Channel, ...]:
-    found, drives = [], record.blows() is None
+    found = []
     for name in record.channels:
         channel = record.channel(name)
-        if channel.kind.of_force and drives:
+        if channel.kind.of_force and record.reads_force:
             continue  # what the prediction is driven by says nothing of it
         if channel.kind.reader is None:
             if not channel.kind.unused:

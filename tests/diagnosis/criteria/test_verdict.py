@@ -62,23 +62,6 @@ def test_what_leaves_more_than_a_remainder_can_be_may_be_no_more_than_alike(
     assert found == verdict
 
 
-@pytest.mark.parametrize(
-    ("before", "explained", "verdict"),
-    [
-        (900.0, -0.002, "nothing-wrong"),  # 0.95 % of the signal, RMS: an honest model leaves it
-        (900.0, 0.002, "unexplained"),
-        (900.0, None, "unexplained"),
-        (1e4, -0.002, "unexplained"),  # 3.2 %
-    ],
-)
-def test_what_explains_nothing_held_out_where_little_is_left_is_no_cause(
-    before, explained, verdict
-):
-    left = Remainder(before, 1e7), Remainder(0.8 * before, 1e7)
-    found = verdict_of(causes(0.999), MORE, MORE, False, explained, (), left)
-    assert found == verdict
-
-
 def test_which_of_several_causes_is_doubted_is_said():
     why = why_not_claimed(causes(0.999, 0.95, 0.999), ())
     assert "3 causes together" in why

@@ -244,6 +244,10 @@ def _concluded(search: Search, nominal: Fit, before: Evidence) -> PercussionDiag
         after = fit_evidence(problem, whole)
         rivals = _rivals(search, whole)
         causes = fitted_causes(search, whole, rivals)
+    if causes and _are_idle(search, nominal, before):
+        search.best, causes, rivals = search.baseline, (), []
+        search.about.restore(problem)
+        whole = nominal
     if allowed(problem):
         whole = to_the_last(problem, whole)
         after = fit_evidence(problem, whole)
@@ -311,6 +315,15 @@ def _concluded(search: Search, nominal: Fit, before: Evidence) -> PercussionDiag
         diagnosis, problem, nominal, whole, search, before, after,
         tuple(others.values()) if claimed else (), left_open, stated,
     )  # fmt: skip
+
+
+def _are_idle(search: Search, nominal: Fit, before: Evidence) -> bool:
+    """Whether causes explain nothing that was held out, where the nominal model leaves little."""
+    problem, baseline, found = search.problem, search.baseline.hypothesis, search.best.hypothesis
+    if not (allowed(problem) and Remainder.of(nominal, before).within_tolerance):
+        return False
+    gain = holdout_gain(problem, baseline, found, search.records, search.kept, search.about)
+    return gain.explained is not None and gain.explained <= 0.0
 
 
 def _rivals(search: Search, whole: Fit) -> list[Trial]:

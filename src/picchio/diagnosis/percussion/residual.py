@@ -151,7 +151,7 @@ def percussion_residual(
         InputError: no record that can be predicted for this robot.
     """
     problem = Problem(robot, campaign, gravity_stiffness=gravity_stiffness)
-    fit = fit_growing(problem, Hypothesis.baseline(robot, campaign.tolerance))
+    fit = fit_growing(problem, Hypothesis.nominal(problem))
     predictions = problem.predictions(fit.hypothesis.effects)
     return PercussionResidual(
         problem, fit, whiteness_test(problem, fit), predictions,
@@ -262,7 +262,8 @@ def transfers(
     fit: Fit, predictions: Sequence[dict[str, FloatArray]]
 ) -> tuple[list[MeasuredRecord], dict[str, Transfer]]:
     """Response over force of the channels that are wrong most, where a force was measured."""
-    chosen = [r for r in fit.records if "force" in r.values]
+    acting = {r.name: force for r in fit.records if (force := _force_read(r)) is not None}
+    chosen = [r for r in fit.records if r.name in acting]
     if not chosen:
         return [], {}
     worst = max(chosen, key=lambda r: float((fit.residuals[fit.records.index(r)] ** 2).mean()))
@@ -280,6 +281,14 @@ def transfers(
         if not all(name in r.values for r in like):
             continue
         simulated = [predictions[fit.records.index(r)][name] for r in like]
-        found[name] = transfer([r.values["force"] for r in like], [r.values[name] for r in like],
+        found[name] = transfer([acting[r.name] for r in like], [r.values[name] for r in like],
                                simulated, worst.setup.samples.step)  # fmt: skip
     return like, found
+
+
+def _force_read(record: MeasuredRecord) -> FloatArray | None:
+    """(m,) N, beside stated blows or in place of them; None where no sensor read it."""
+    setup = record.setup
+    if setup.blows.recorded:
+        return setup.blows.force()(setup.samples.times)
+    return record.values.get("force")

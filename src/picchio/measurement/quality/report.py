@@ -74,7 +74,7 @@ def summarise(scan: RecordScan) -> RecordSummary:
     blows = scan.window.blows
     words = None
     if not motion:
-        if blows is None and not record.steady:
+        if record.reads_force:
             words = "the force was recorded"
         else:
             words = blows.describe() if blows is not None else "not stated"

@@ -23,6 +23,7 @@ _ANYWHERE: dict[TargetKind, Callable[[FlexibleRobot], Iterable[str]]] = {
 LACKING = {
     "bursts": "no record has a burst of several blows",
     "programmed": "the force was recorded in every record",
+    "recorded": "the force was not recorded in place of stated blows",
     "reshaped": "blows of a force that was measured have no other shape to turn into",
     "days": "the records are not of several known dates",
     "kelvin": "the records are not of several known temperatures",

@@ -14,6 +14,7 @@ from picchio.core.provenance import provenance
 from picchio.diagnosis.life import matters
 from picchio.diagnosis.motion.conclude.during_blows import BlowEffects, MotionLife
 from picchio.diagnosis.motion.data.system import System
+from picchio.diagnosis.percussion.conclude.causes import nuisance_name
 from picchio.diagnosis.percussion.diagnosis import PercussionDiagnosis
 from picchio.diagnosis.percussion.follow_up.records import when
 from picchio.diagnosis.result import Cause, Diagnosis, Value, differences, in_tolerances, in_words
@@ -478,7 +479,7 @@ def _nuisances(found: PercussionDiagnosis) -> list[tuple[str, str, str, str]]:
     rows = []
     for effect in hypothesis.effects[: hypothesis.n_nuisances]:
         key = effect.tolerance
-        name = f"{key}.{effect.target}" if key == "stiffness" else key
+        name = nuisance_name(effect)
         value = found.diagnosis.nuisances.get(name)
         if value is None or effect.label in hypothesis.freed:
             continue

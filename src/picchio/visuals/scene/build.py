@@ -13,7 +13,6 @@ from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.diagnosis.result import Diagnosis
 from picchio.excitation.excitation import Excitation
-from picchio.excitation.measured import MeasuredForce
 from picchio.model.model import Model
 from picchio.robot.annotations.flexibility import estimate_notice
 from picchio.robot.flexible_robot import FlexibleRobot
@@ -128,11 +127,7 @@ def diagnosis_scene(found: PercussionDiagnosis, **options: Any) -> Scene:
     levels = [float(np.mean(residual**2)) for residual in found.baseline.residuals]
     setup = found.baseline.records[int(np.argmax(levels))].setup
     record = found.problem.campaign[setup.name]
-    blows, hits = record.blows(), record.hits
-    if blows is None:
-        # Only measured: what the tool did from the first blow on.
-        data = record.read(["force"])
-        blows, hits = MeasuredForce.from_start(data["time"], data["force"]), 1
+    blows, hits = record.acting()
     return build_scene(
         found.problem.robot,
         setup.geometry.pose,

@@ -156,6 +156,17 @@ def _confidence(
     return min(told)
 
 
+def nuisance_name(effect: Effect) -> str:
+    """What a nuisance is called: by its key of `[tolerance]`, where no sensor shares that.
+
+    Args:
+        effect: a nuisance.
+    """
+    if effect.tolerance == "stiffness":
+        return f"stiffness.{effect.target}"
+    return effect.name if effect.tolerance == "sensor_gain" else effect.tolerance
+
+
 def fitted_nuisances(found: Fit) -> dict[str, Value]:
     """Fitted nuisances, in their own units; less sure where more than noise is left."""
     if found.jacobians is None:
@@ -171,14 +182,13 @@ def fitted_nuisances(found: Fit) -> dict[str, Value]:
         effect = found.hypothesis.effects[unknown.effect]
         if unknown.effect >= found.hypothesis.n_nuisances:
             continue
-        key = effect.tolerance
+        key, name = effect.tolerance, nuisance_name(effect)
         scale, std = math.exp(vector[k]), math.exp(vector[k]) * math.sqrt(covariance[k, k])
         if key == "stiffness":
             unit = unit_of(robot, effect.target, "N*m/rad")
-            size, name = float(nominal[effect.target]), f"stiffness.{effect.target}"
+            size = float(nominal[effect.target])
         else:
-            size, unit = (ratio, "1") if key == "damping_ratio" else (force, "N")
-            name = key
+            size, unit = {"damping_ratio": (ratio, "1"), "force": (force, "N")}.get(key, (1.0, "1"))
         result[name] = Value(scale * size, std * size, unit)
     return result
 

@@ -37,9 +37,11 @@ def fitted_spread(problem: Problem, whole: Fit) -> Uncertain:
         whole: the fit to all records.
     """
     hypothesis, marginal = whole.hypothesis, problem.marginal
-    covariance = reported_covariance(whole)
+    covariance, tolerance = reported_covariance(whole), problem.campaign.tolerance
+    # Of a force that was read nothing is learnt of the force of blows that are stated.
+    stated = [_harder("force", tolerance.force)] if problem.recorded and tolerance.force else []
     if marginal is None:
-        return _uncertain(hypothesis, covariance, [])
+        return _uncertain(hypothesis, covariance, stated)
     claimed = {effect.label for effect in hypothesis.effects}
     names = [record.name for record in whole.records]
     raw = problem.unmarginalised(hypothesis.effects, whole.records)
@@ -49,7 +51,7 @@ def fitted_spread(problem: Problem, whole: Fit) -> Uncertain:
     kept = [k for k, one in enumerate(shared) if _counts(one) and one.means not in claimed]
     across = -(marginal.taken(_rows(hypothesis)) @ spread)[:, kept]
     together = np.block([[covariance, across], [across.T, spread[np.ix_(kept, kept)]]])
-    numbers = [*(shared[k] for k in kept), *_anew(problem, problem.campaign.tolerance)]
+    numbers = [*(shared[k] for k in kept), *_anew(problem, tolerance), *stated]
     found = _uncertain(hypothesis, together, numbers)
     centre = found.centre.copy()
     centre[len(covariance) : len(covariance) + len(kept)] = where[kept]
@@ -116,15 +118,19 @@ def _anew(problem: Problem, sigma: Tolerance) -> list[Inexact]:
 
         return Inexact(f"direction.{'xyz'[int(axis.argmax())]}", "direction", False, "blows", turn)
 
-    def harder(blows: Blows, size: float) -> Blows:
-        return blows.change(height=blows.height * (1.0 + size * sigma.blow_force))
-
     if sigma.direction > 0.0:
         found += [turned(axis) for axis in np.eye(3)]
     if sigma.blow_force > 0.0:
         # A few cycles make most of the damage: as if all blows were harder.
-        found.append(Inexact("blow_force", "blow_force", False, "blows", harder))
+        found.append(_harder("blow_force", sigma.blow_force))
     return found
+
+
+def _harder(key: str, sigma: float) -> Inexact:
+    def harder(blows: Blows, size: float) -> Blows:
+        return blows.change(height=blows.height * (1.0 + size * sigma))
+
+    return Inexact(key, key, False, "blows", harder)
 
 
 def _uncertain(

@@ -44,11 +44,9 @@ def verdict_of(
         common: effects that all sensors, though of different kinds, would have alike.
         improbable: whether tolerances would have to be exceeded even with the causes.
     """
-    allowed = left is not None and left[0].within_tolerance
     if not causes:
-        return "nothing-wrong" if before.is_noise or allowed else "unexplained"
-    if allowed and explained is not None and explained <= 0.0:
-        return "nothing-wrong"  # no help where it was not fitted, and none was needed
+        little = before.is_noise or (left is not None and left[0].within_tolerance)
+        return "nothing-wrong" if little else "unexplained"
     if common:
         return "unexplained"
     if leaves_little(after, left):

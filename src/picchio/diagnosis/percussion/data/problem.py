@@ -248,6 +248,11 @@ class Problem:
         """All channel groups."""
         return tuple(dict.fromkeys(g for r in self.records for g in r.setup.groups))
 
+    @property
+    def recorded(self) -> bool:
+        """Whether the force of every record was read, no blows being stated."""
+        return all(record.setup.blows.recorded for record in self.records)
+
     @cached_property
     def natural_frequencies(self) -> FloatArray:
         """(poses, modes) Hz, ascending; of the nominal robot."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from picchio.campaign.tables import Tolerance
 from picchio.core.arrays import FloatArray
+from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.fit.known import NOTHING, Known, known_of
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.evidence import Evidence
@@ -87,15 +88,20 @@ class Unknown:
         return _STEP_LOG if self.logarithmic else _STEP_LINEAR
 
 
-def nuisances(robot: FlexibleRobot) -> tuple[Effect, ...]:
-    """What is never quite as stated, in the order of `[tolerance]`: stiffness of joints, ..."""
+def nuisances(robot: FlexibleRobot, recorded: bool = False) -> tuple[Effect, ...]:
+    """What is never quite as stated, in the order of `[tolerance]`: stiffness of joints, ...
+
+    Args:
+        robot: the robot.
+        recorded: whether the force of every record was read, no blows being stated.
+    """
     tolerated = {kind.tolerance: kind for kind in catalogue().values() if kind.tolerance}
-    evidence = Evidence(robot)
+    evidence = Evidence(robot, recorded=recorded)
     return tuple(
         kind(target)
         for key in Tolerance.model_fields
         if (kind := tolerated.get(key)) is not None
-        for target in kind.targets(evidence)
+        for target in kind.applies(evidence)
     )
 
 
@@ -124,15 +130,27 @@ class Hypothesis:
     known: Known = NOTHING
 
     @classmethod
-    def baseline(cls, robot: FlexibleRobot, tolerance: Tolerance) -> Hypothesis:
+    def baseline(
+        cls, robot: FlexibleRobot, tolerance: Tolerance, recorded: bool = False
+    ) -> Hypothesis:
         """The nominal model with its nuisances.
 
         Args:
             robot: as its files say.
             tolerance: how far stiffness and damping may be off, where its files state no spread.
+            recorded: as of `nuisances`.
         """
-        found = nuisances(robot)
+        found = nuisances(robot, recorded)
         return cls(found, tolerance, len(found), known=known_of(robot, found, tolerance))
+
+    @classmethod
+    def nominal(cls, problem: Problem) -> Hypothesis:
+        """As `baseline`, of a problem's robot and records.
+
+        Args:
+            problem: data and noise.
+        """
+        return cls.baseline(problem.robot, problem.campaign.tolerance, problem.recorded)
 
     @property
     def causes(self) -> tuple[Effect, ...]:

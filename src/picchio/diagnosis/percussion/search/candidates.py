@@ -31,7 +31,7 @@ def evidence_of(problem: Problem) -> Evidence:
         accelerations=frozenset(g for g, kind in channels.items() if kind.derivative == 2),
         forces=tuple(g for g in problem.groups if channels[g].of_force),
         bursts=any(b.start.size > 1 and b.period is None for b in blows),
-        recorded=all(b.recorded for b in blows),
+        recorded=problem.recorded,
         reshaped=any(b.other is not None for b in blows),
         days=_spread(problem, "days"),
         kelvin=_spread(problem, "temperature"),
@@ -176,7 +176,7 @@ def warm_up(problem: Problem, candidates: Sequence[tuple[type[Effect], str]]) ->
     """
     if worker_count(problem.workers) < 2:
         return
-    nominal = Hypothesis.baseline(problem.robot, problem.campaign.tolerance)
+    nominal = Hypothesis.nominal(problem)
     scales = measure_scales(problem, nominal.effects, problem.predictions(nominal.effects))
     first = dict(reversed(candidates))
     for kind, target in first.items():

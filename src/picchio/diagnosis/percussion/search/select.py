@@ -91,7 +91,7 @@ def begin_search(
         finer: effects and targets that tell another cause with more numbers.
     """
     say("fitting the nominal model within its tolerance")
-    start = Hypothesis.baseline(problem.robot, problem.campaign.tolerance)
+    start = Hypothesis.nominal(problem)
     begin = fit_growing(problem, start, split[0])
     baseline = settled(problem, begin, split[0])
     if start.known.labels and baseline.chi_square > ELSE * baseline.samples:

@@ -15,6 +15,7 @@ class ForceAmplitude(Effect):
     target_kind = "tool"
     parameters = (factor("scale", 0.02, 50.0, "true force over programmed"),)
     meaning = "the tool hits harder or softer than programmed"
+    takes = "programmed"
     tolerance = "force"
     tried = ({"scale": 1.25},)
 
