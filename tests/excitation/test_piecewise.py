@@ -9,6 +9,7 @@ from scipy.integrate import quad
 from picchio.core.errors import InputError
 from picchio.excitation.measured import MeasuredForce
 from picchio.excitation.pulse_train import HalfSineTrain, PulseTrain
+from picchio.model.blows import Blows
 
 MEASURED = MeasuredForce(
     np.array([0.0, 0.001, 0.003, 0.004, 0.02]), np.array([0.0, 310.0, 80.0, -20.0, 0.0]), 0.04
@@ -209,3 +210,18 @@ def test_bad_measured_forces_are_refused(tmp_path, text, part):
 def test_a_period_shorter_than_the_record_is_refused():
     with pytest.raises(InputError, match="period"):
         MeasuredForce(np.array([0.0, 1.0]), np.array([1.0, 2.0]), 0.5)
+
+
+def test_a_force_leaves_zero_where_its_blows_begin():
+    direction = np.array([0.0, 0.0, 1.0])
+    time = 5e-4 * np.arange(-100, 400)
+    read = np.zeros(time.size)
+    for begins in (0.01, 0.05, 0.0915):
+        inside = (time > begins) & (time < begins + 0.004)
+        read[inside] = 300.0 * np.sin(np.pi * (time[inside] - begins) / 0.004)
+    force = MeasuredForce.from_start(time, read)
+    blows = Blows.of(force, 1, direction, recorded=True)
+    np.testing.assert_allclose(blows.onsets, (0.01, 0.05, 0.0915), atol=5e-4)
+    assert blows.interval == pytest.approx(0.04075, abs=5e-4)
+    stated = Blows.of(PulseTrain(300.0, 0.04, 0.004), 3, direction)
+    np.testing.assert_allclose(stated.onsets, (0.0, 0.04, 0.08))

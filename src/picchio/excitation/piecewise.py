@@ -139,6 +139,12 @@ class PiecewiseForce:
         value = self.in_piece(index, t - self.start[index])
         return np.where((t >= 0.0) & (t < self.end), value, 0.0)
 
+    @property
+    def onsets(self) -> FloatArray:
+        """(k,) s, where it begins to differ from zero."""
+        acts = np.any([getattr(self, name) != 0.0 for name in _FORCES], axis=0)
+        return np.asarray(self.start[acts & ~np.concatenate([[False], acts[:-1]])])
+
     def scaled(self, factor: float) -> PiecewiseForce:
         """So many times as large.
 

@@ -28,7 +28,7 @@ class Blows:
         period: s, after which everything repeats (one period's blows are given); None for a
             burst, with silence after it.
         direction: (3,) unit vector, world.
-        interval: s, from one programmed blow to the next.
+        interval: s, from one blow to the next, as programmed; of a recorded force its median.
         tool_rotation: (3, 3), the tool frame's axes at rest, world.
         recorded: whether the force was recorded together with the response: then its one
             "blow" is the whole record.
@@ -49,13 +49,20 @@ class Blows:
     recorded: bool = False
 
     @classmethod
-    def of(cls, excitation: Excitation, hits: int | None, direction: FloatArray) -> Blows:
+    def of(
+        cls,
+        excitation: Excitation,
+        hits: int | None,
+        direction: FloatArray,
+        recorded: bool = False,
+    ) -> Blows:
         """The blows as programmed: `hits` of them, or a steady train.
 
         Args:
             excitation: the tool's blows.
             hits: of a burst; None for a steady train.
             direction: (3,) unit vector, world axes.
+            recorded: whether the excitation is what was recorded.
 
         Raises:
             InputError: hits below 1, or more than anybody means.
@@ -65,6 +72,7 @@ class Blows:
         count = hits or 1
         height = excitation.peak_force or 1.0
         shape, other = excitation.unit_blows
+        between = np.diff(shape.onsets) if recorded else np.zeros(0)
         return cls(
             start=excitation.period * np.arange(count),
             height=np.full(count, float(height)),
@@ -74,7 +82,8 @@ class Blows:
             width=excitation.width,
             period=None if hits else excitation.period,
             direction=direction,
-            interval=excitation.period,
+            interval=float(np.median(between)) if between.size else excitation.period,
+            recorded=recorded,
         )
 
     @property
@@ -83,6 +92,11 @@ class Blows:
         times, heights = self.start.tobytes(), self.height.tobytes()
         other = self.other.key if self.other is not None and self.blend else None
         return (times, heights, self.stretch, self.blend, self.period, self.shape.key, other)
+
+    @property
+    def onsets(self) -> FloatArray:
+        """(k,) s, when a blow begins, or a recorded force leaves zero."""
+        return np.unique(self.start[:, None] + self.shape.onsets if self.recorded else self.start)
 
     @property
     def peak(self) -> float:

@@ -544,7 +544,7 @@ def _warn_of_blows_beyond(record: Record) -> None:
 def _blows(record: Record) -> Blows:
     direction = record.direction
     assert direction is not None
-    return Blows.of(*record.acting(), direction).change(recorded=record.reads_force)
+    return Blows.of(*record.acting(), direction, record.reads_force)
 
 
 def _channels(record: Record, robot: FlexibleRobot) -> tuple[Channel, ...]:

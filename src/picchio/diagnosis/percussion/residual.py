@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -27,6 +28,7 @@ from picchio.robot.flexible_robot import FlexibleRobot
 _BANDS = 110
 _HIGHEST = 6.0
 _MOST_WINDOWS = 60
+_ALIKE = 0.02  # between the intervals of blows that are shown together
 # A joint moves if its deflection is so many times its noise.
 _CLEAR = 15.0
 # Channels whose transfer function is shown.
@@ -182,7 +184,7 @@ def over_time(fit: Fit) -> OverTime:
         (r, w)
         for r, w in zip(fit.records, fit.residuals, strict=True)
         if r.setup.blows.start.size == first.blows.start.size
-        and abs(r.setup.blows.interval - first.blows.interval) < 1e-9
+        and math.isclose(r.setup.blows.interval, first.blows.interval, rel_tol=_ALIKE)
     ]
     window = first.blows.interval
     start = min(float(r.setup.samples.times[0]) for r, _ in like)
@@ -201,7 +203,7 @@ def over_time(fit: Fit) -> OverTime:
             levels.append(record.values[channel.name] / record.noise[channel.name].std)
     residual = {g: by_window(times, rows, edges) for g, (times, rows, _) in parts.items()}
     signal = {g: by_window(times, levels, edges) for g, (times, _, levels) in parts.items()}
-    last = None if first.steady else float(first.blows.start.max())
+    last = None if first.steady else float(first.blows.onsets.max())
     return OverTime(edges, residual, signal, last)
 
 

@@ -85,7 +85,7 @@ class View:
     @property
     def blows(self) -> FloatArray:
         """(k,) s, where blows begin."""
-        start = np.unique(self.record.setup.blows.start)
+        start = self.record.setup.blows.onsets
         return np.asarray(start[start <= self.time[-1]])
 
     def aligned(self, predictions: dict[str, FloatArray]) -> FloatArray:
