@@ -55,6 +55,12 @@ def test_what_the_force_sensor_reads_says_nothing_of_the_tool(arm, few):
     assert reading.blows(stated, Conditions()) is stated
     assert reading.blows(read, Conditions()).peak == pytest.approx(1.1 * read.peak)
 
+    late = effect_class("force_delay")("tool", delay=0.5e-3)
+    assert late.blows(stated, Conditions()) is stated
+    moved, was = late.blows(read, Conditions()).force(), read.force()
+    times = np.linspace(0.01, 0.1, 200)
+    assert moved(times - 0.5e-3) == pytest.approx(was(times), rel=1e-9, abs=1e-6)
+
 
 def test_of_a_stated_force_as_little_is_known_after_it_was_read(arm, few):
     """A life's interval has the tolerance of the tool's force before and after alike."""
@@ -97,8 +103,8 @@ def test_response_over_a_force_that_is_read_is_shown(arm, few):
     assert apart < 0.2 * np.linalg.norm(one.measured[tells])
 
 
-@pytest.mark.parametrize(("held_out", "stands"), [(-0.01, False), (0.5, True)])
-def test_a_cause_that_helps_nothing_held_out_is_dropped_where_little_was_left(
+@pytest.mark.parametrize(("held_out", "stands"), [(-0.01, False), (0.5, False), (0.7, True)])
+def test_a_cause_that_helps_little_held_out_is_dropped_where_little_was_left(
     arm, few, monkeypatch, held_out, stands
 ):
     """What is told then is the nominal model, its values and its verdict."""
@@ -118,11 +124,15 @@ def test_a_cause_that_helps_nothing_held_out_is_dropped_where_little_was_left(
     if not stands:
         assert found.diagnosis.verdict == "nothing-wrong" and not found.diagnosis.causes
         assert set(found.diagnosis.nuisances) >= {"stiffness.joint_1", "force_reading"}
+        gain = found.diagnosis.gain  # of one model, judged twice
+        assert gain.extended_nrmse == pytest.approx(gain.baseline_nrmse, rel=1e-12)
 
 
 @pytest.mark.slow
-def test_nothing_wrong_is_nothing_wrong(arm):
-    campaign, _ = trial.make({**CASE, "kind": "null", "draw": 91201}, 1)
+@pytest.mark.parametrize("draw", [91201, 91206])
+def test_nothing_wrong_is_nothing_wrong(arm, draw):
+    """In draw 91206 the slopes of all records say nothing of values that fewer have told."""
+    campaign, _ = trial.make({**CASE, "kind": "null", "draw": draw}, 1)
     found = diagnose_percussion(arm, campaign).diagnosis
     assert found.verdict == "nothing-wrong"
     assert found.remainder.within_tolerance
@@ -138,3 +148,16 @@ def test_what_is_wrong_is_named(arm):
     assert (cause.effect, cause.target) == (hidden["effect"], hidden["target"])
     gain = cause.parameters["gain"]
     assert abs(gain.value - hidden["parameters"]["gain"]) < 4.0 * gain.std < 0.2
+
+
+@pytest.mark.slow
+def test_a_force_sensor_that_is_late_is_told_as_that(arm, worlds):
+    """And not as all other sensors being early."""
+    campaign, _ = worlds.make(seed=91300, mismatch=1.0, snr_db=40.0, sensors=CASE["sensors"],
+                              causes=[("sensor_delay", "force", {"delay": 2e-3})],
+                              **trial.READ)  # fmt: skip
+    found = diagnose_percussion(arm, campaign).diagnosis
+    (cause,) = found.causes
+    assert (found.verdict, cause.effect) == ("named", "force_delay")
+    delay = cause.parameters["delay"]
+    assert abs(delay.value - 2e-3) < 4.0 * delay.std < 1e-5

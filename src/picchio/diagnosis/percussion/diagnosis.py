@@ -37,7 +37,7 @@ from picchio.diagnosis.percussion.criteria.dominance import dominant_causes, exp
 from picchio.diagnosis.percussion.criteria.equivalence import bic
 from picchio.diagnosis.percussion.criteria.exceeded import exceeded
 from picchio.diagnosis.percussion.criteria.pose_consistency import fit_evidence
-from picchio.diagnosis.percussion.criteria.remainder import Remainder, allowed
+from picchio.diagnosis.percussion.criteria.remainder import LEAST_EXPLAINED, Remainder, allowed
 from picchio.diagnosis.percussion.criteria.whiteness import Evidence
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem, Split, held_out
 from picchio.diagnosis.percussion.fit.drawn import refit, with_solved_numbers
@@ -64,7 +64,7 @@ from picchio.diagnosis.percussion.tolerance.linearise import (
     settled,
     to_the_last,
 )
-from picchio.diagnosis.result import Cause, Diagnosis, Estimate
+from picchio.diagnosis.result import Cause, Diagnosis, Estimate, Gain
 from picchio.model.effects.effect import Effect
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.tasks import Task
@@ -244,19 +244,20 @@ def _concluded(search: Search, nominal: Fit, before: Evidence) -> PercussionDiag
         after = fit_evidence(problem, whole)
         rivals = _rivals(search, whole)
         causes = fitted_causes(search, whole, rivals)
-    if causes and _are_idle(search, nominal, before):
+    gain = _held_out(search)
+    if causes and _are_idle(problem, gain, (nominal, before), (whole, after)):
         search.best, causes, rivals = search.baseline, (), []
         search.about.restore(problem)
-        whole = nominal
+        whole, gain = nominal, _held_out(search)
+    # Judged with the slopes that it was fitted with: those of all records may lie elsewhere.
+    stands, judged = search.best.hypothesis, search.kept or search.records
+    remainder = held_out_remainder(problem, stands, judged)
     if allowed(problem):
         whole = to_the_last(problem, whole)
         after = fit_evidence(problem, whole)
     off = exceeded(problem, whole)
     left_open, stated = fitted_spread(problem, whole), as_stated(problem, whole)
     beyond = off is not None and off.improbable
-    stands, judged = search.best.hypothesis, search.kept or search.records
-    nuisances = search.baseline.hypothesis
-    gain = holdout_gain(problem, nuisances, stands, search.records, search.kept, search.about)
     left = None
     if allowed(problem):
         left = Remainder.of(nominal, before), Remainder.of(whole, after)
@@ -266,7 +267,6 @@ def _concluded(search: Search, nominal: Fit, before: Evidence) -> PercussionDiag
         same, rivals, causes = weighed(search, whole)
     common = common_faults(whole.hypothesis, reported_covariance(whole), problem.groups)
     verdict = verdict_of(causes, before, after, bool(same), gain.explained, common, left, beyond)
-    remainder = held_out_remainder(problem, stands, judged)
     if verdict == "nothing-wrong" and (
         beyond or not (before.is_noise or remainder.within_tolerance)
     ):
@@ -317,13 +317,25 @@ def _concluded(search: Search, nominal: Fit, before: Evidence) -> PercussionDiag
     )  # fmt: skip
 
 
-def _are_idle(search: Search, nominal: Fit, before: Evidence) -> bool:
-    """Whether causes explain nothing that was held out, where the nominal model leaves little."""
-    problem, baseline, found = search.problem, search.baseline.hypothesis, search.best.hypothesis
-    if not (allowed(problem) and Remainder.of(nominal, before).within_tolerance):
+def _held_out(search: Search) -> Gain:
+    """On the records held out, without causes and with those that were found."""
+    without, found = search.baseline.hypothesis, search.best.hypothesis
+    about = search.about
+    return holdout_gain(search.problem, without, found, search.records, search.kept, about)
+
+
+def _are_idle(
+    problem: Problem, gain: Gain, without: tuple[Fit, Evidence], found: tuple[Fit, Evidence]
+) -> bool:
+    """Whether the nominal model leaves little, and causes explain little of that held out.
+
+    They could not be claimed even in part, and an honest model may leave what they lessen.
+    """
+    if not allowed(problem) or gain.explained is None:
         return False
-    gain = holdout_gain(problem, baseline, found, search.records, search.kept, search.about)
-    return gain.explained is not None and gain.explained <= 0.0
+    left = Remainder.of(*without), Remainder.of(*found)
+    enough = 0.0 if leaves_little(found[1], left) else LEAST_EXPLAINED
+    return left[0].within_tolerance and gain.explained <= enough
 
 
 def _rivals(search: Search, whole: Fit) -> list[Trial]:

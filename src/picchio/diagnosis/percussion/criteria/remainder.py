@@ -32,6 +32,8 @@ _TEMPERS = np.geomspace(1.0, 1e6, 7)
 # Of the power of what the causes explain: what a named cause may leave, and a partial one.
 _NAMED = 0.1
 _PARTIAL = 0.5
+# Of the power that was left, what causes explain at the least that are claimed in part.
+LEAST_EXPLAINED = 1.0 / (1.0 + _PARTIAL)
 
 
 @dataclass(frozen=True)
