@@ -419,6 +419,12 @@ def test_a_rival_that_came_near_is_compared_about_its_own_inexact_numbers(arm):
     other, _ = exchange_settled(search)
     assert other.hypothesis.labels == {"pulse_shape:tool", clipping.label}
     assert other.cost < best.cost - 100.0
+    # Even if only noise is left; and what was known beside it then may not be needed any more.
+    louder = effect_class("sensor_gain")("deflection", gain=1.01)
+    beside = [search.fit(t.fit.hypothesis.plus(louder), iterations=2) for t in step]
+    search.steps[0] = [replace(t, fit=fit) for t, fit in zip(step, beside, strict=True)]
+    other, _ = exchange_settled(search, simpler=True)
+    assert other.hypothesis.labels == {"pulse_shape:tool", clipping.label}
     # Nor need it have come near before all causes were known.
     search.steps, search.candidates = [], [(effect_class("pulse_shape"), "tool")]
     (rival,) = rivals_of(search, best, "pulse_width:tool")

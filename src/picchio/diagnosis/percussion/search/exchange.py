@@ -74,16 +74,17 @@ def exchange_settled(search: Search, simpler: bool = False) -> tuple[Fit, About]
 
     Args:
         search: what was found, step by step.
-        simpler: try rivals with fewer numbers alone. Where only noise is left, what was chosen may
-            still be more than it takes: while a friction was missing, a hysteresis, which loses
-            energy, made up for a spring.
+        simpler: try rivals with no more numbers alone. Where only noise is left, what was chosen
+            may still be more than it takes: while a friction was missing, a hysteresis, which
+            loses energy, made up for a spring. Or it is alike, and leaves a little more: blows
+            that are shorter than stated, of those that are rounder.
 
     Returns:
         None where no rival that came near does better so, or where everything is exact.
     """
     best, found = search.best, None
     for chosen, rival in _earlier(search) if allowed(search.problem) else ():
-        if simpler and count_numbers(rival.fit.hypothesis) >= count_numbers(chosen.fit.hypothesis):
+        if simpler and count_numbers(rival.fit.hypothesis) > count_numbers(chosen.fit.hypothesis):
             continue
         explained = max(search.baseline.cost - chosen.fit.cost, 0.0)
         joined = _in_its_place(search, best, chosen, rival)
@@ -139,6 +140,8 @@ def _in_its_place(search: Search, best: Fit, chosen: Trial, rival: Trial) -> Hyp
     for cause in best.hypothesis.causes:
         if cause.label not in (chosen.label, *joined.labels):
             joined = joined.joined(cause)
+    for label in joined.labels - labels - {rival.label}:  # what is not needed any more
+        joined = joined.minus(label)
     return joined
 
 
