@@ -135,6 +135,10 @@ def test_reading_a_measured_force(tmp_path):
     assert force.time[0] == 0.0
     alone = MeasuredForce.from_csv(path)
     assert alone.period == pytest.approx(0.004)
+    assert force.describe() == "measured blows (force.csv, peak 300 N), every 40 ms"
+    # Of no file: recorded together with a response, and not repeated.
+    whole = MeasuredForce.from_start(force.time, force.samples)
+    assert whole.describe() == "measured force (peak 300 N, 4 ms)"
 
 
 @pytest.mark.parametrize("first", [-0.0005, 0.0, 0.00025])

@@ -151,7 +151,9 @@ class MeasuredForce(Excitation):
 
     def describe(self) -> str:
         """One line for people."""
-        name = Path(self.source).name if self.source else "a record"
-        return (
-            f"measured blows ({name}, peak {self.peak_force:g} N), every {self.period * 1e3:g} ms"
-        )
+        every = f", every {self.period * 1e3:g} ms"
+        if not self.source:  # such as the force beside the response, which is not repeated
+            length = float(self.time[-1])
+            lasts = f"measured force (peak {self.peak_force:.4g} N, {length * 1e3:.4g} ms)"
+            return lasts + (every if self.period > length else "")
+        return f"measured blows ({Path(self.source).name}, peak {self.peak_force:g} N){every}"
