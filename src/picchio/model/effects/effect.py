@@ -371,7 +371,7 @@ class Effect(ABC):
         Args:
             conditions: under which the loads are asked for.
         """
-        if self.where == "sensor":
+        if self.where == "sensor" or self.takes == "recorded":
             return "changes what a sensor reads, not the loads"
         if self.where == "motion":
             return "acts while the robot moves, not while the tool hits"

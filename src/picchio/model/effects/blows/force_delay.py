@@ -21,10 +21,6 @@ class ForceDelay(Effect):
     meaning = "the force sensor is late against the other sensors"
     takes = "recorded"
 
-    def without_load(self, conditions: Conditions) -> str:
-        """It is of a sensor."""
-        return "changes when a force sensor reads, not the loads"
-
     def blows(self, blows: Blows, conditions: Conditions) -> Blows:
         """A recorded force begins earlier; what would lie before t = 0 is lost."""
         if not blows.recorded:

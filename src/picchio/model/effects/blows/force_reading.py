@@ -22,10 +22,6 @@ class ForceReading(Effect):
     tolerance = "sensor_gain"
     tried = ({"scale": 1.25},)
 
-    def without_load(self, conditions: Conditions) -> str:
-        """It is of a sensor."""
-        return "changes what a force sensor reads, not the loads"
-
     def blows(self, blows: Blows, conditions: Conditions) -> Blows:
         """Scale a recorded force."""
         if not blows.recorded:
