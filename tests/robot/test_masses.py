@@ -155,19 +155,19 @@ REAL = [(9.0, 0.13, ""), (6.0, 0.09, ""), (4.0, 0.06, "")]
     [
         (REAL, 1e4, []),
         ([(2.0, 0.01 * k, "") for k in (1.2, 2.1, 3.3)], 1e4,
-         ["3 links have the same mass of 2 kg: l1, l2, l3: placeholders?"]),
+         ["links 'l1', 'l2', 'l3': the same mass of 2 kg; placeholders?"]),
         ([(k, 0.021, "") for k in (1.0, 1.5, 1.8)], 1e4,
-         ["3 links have the same inertia: l1, l2, l3: placeholders?"]),
+         ["links 'l1', 'l2', 'l3': the same inertia; placeholders?"]),
         ([(9.0, 0.1, ""), (6.0, 0.01, "")], 1e4,
-         ["the inertias of l1, l2 are round numbers, alike about every axis"]),
+         ["links 'l1', 'l2': inertias of a round number, alike about every axis; placeholders?"]),
         ([*REAL[:2], (0.5, 0.22, "")], 1e4,
          ["link 'l3': an inertia of 0.22 kg m^2 for 0.5 kg is more than any body of its size"]),
         ([*REAL[:2], (3.0, 2e-5, "")], 1e4, ["link 'l3': an inertia of 2e-05 kg m^2 for 3 kg is as "
          "little as a point's; as a solid of its shape it would have 0.0425"]),
         ([REAL[0], (0.0, 0.0, ""), REAL[2]], 1e4,
-         ["no mass is given for l2, nor for what is fixed to it"]),
-        (REAL, 1e10, [f"joint '{j}' would vibrate at" for j in ("j1", "j2", "j3")]),
-        (REAL, 1e-1, [f"joint '{j}' would vibrate at" for j in ("j1", "j2", "j3")]),
+         ["link 'l2': no mass is given, nor for what is fixed to it"]),
+        (REAL, 1e10, [f"joint '{j}': would vibrate at" for j in ("j1", "j2", "j3")]),
+        (REAL, 1e-1, [f"joint '{j}': would vibrate at" for j in ("j1", "j2", "j3")]),
     ],
 )  # fmt: skip
 def test_masses_that_can_hardly_be_are_told(write, recwarn, bodies, stiffness, told):

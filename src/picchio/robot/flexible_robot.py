@@ -14,6 +14,7 @@ from picchio.core.errors import InputError
 from picchio.robot.dynamics.pose import check_pose
 from picchio.robot.dynamics.rigid_model import RigidModel
 from picchio.robot.dynamics.statics import RobotState, balancing, stiffness_at_torque
+from picchio.robot.finding import Finding
 from picchio.robot.joint import Joint
 from picchio.robot.masses.check import check_mass_at
 from picchio.robot.spread import Posterior, Spread
@@ -47,6 +48,7 @@ class FlexibleRobot:
         effect_tables: of a saved model: how the world departs from the robot's files, as
             `picchio.model.effects.from_dict` reads it.
         warnings: what was warned of while it was loaded.
+        findings: what is impossible or doubtful about its own numbers; among the warnings, too.
         spreads: how well values are known, by name such as "stiffness.joint_1".
         posterior: how these hang together, or None.
     """
@@ -66,6 +68,7 @@ class FlexibleRobot:
     tool_point: str
     effect_tables: tuple[Mapping[str, Any], ...] = ()
     warnings: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
     spreads: Mapping[str, Spread] = field(default_factory=dict)
     posterior: Posterior | None = None
     lower: Array = field(init=False)

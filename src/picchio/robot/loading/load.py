@@ -35,7 +35,7 @@ from picchio.robot.joint import Joint, is_drive
 from picchio.robot.loading.find import FoundRobot, find_robot
 from picchio.robot.loading.saved_model import is_saved_model, read_saved_model
 from picchio.robot.masses.check import check_masses
-from picchio.robot.masses.doubts import doubts_about_masses
+from picchio.robot.masses.doubts import findings_of
 from picchio.robot.masses.given import give_masses
 from picchio.robot.urdf.check import read_tree
 from picchio.robot.urdf.normalised import normalise
@@ -212,9 +212,10 @@ def _load(
         posterior=choose_posterior(sources, spreads),
     )
     check_masses(result)
-    for doubt in doubts_about_masses(result, root):
-        warn_user(f"{found.urdf.name}: {doubt}")
-    return result
+    findings = tuple(findings_of(result, root))
+    for finding in findings:
+        warn_user(f"{found.urdf.name}: {finding}")
+    return replace(result, findings=findings)
 
 
 def _sources(

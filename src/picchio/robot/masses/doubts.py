@@ -17,10 +17,12 @@ from lxml import etree
 from picchio.core.arrays import symmetric
 from picchio.core.errors import InputError
 from picchio.robot.annotations.flexibility import is_estimate
+from picchio.robot.finding import Finding
 from picchio.robot.masses.by_volume import Body, bodies
 from picchio.robot.masses.check import general_pose, moving_links
 from picchio.robot.units import TURNING
-from picchio.robot.urdf.tree import Inertial, UrdfTree
+from picchio.robot.urdf.check import bad_inertia
+from picchio.robot.urdf.tree import MOVABLE, Inertial, UrdfTree
 from picchio.robot.urdf.xml import children
 
 if TYPE_CHECKING:
@@ -37,17 +39,23 @@ _POINT = 0.03
 _LOWEST, _HIGHEST = 0.5, 2000.0
 
 
-def doubts_about_masses(robot: FlexibleRobot, root: etree._Element) -> Iterator[str]:
-    """What is doubtful about the masses that flexible joints carry, a sentence each.
+def findings_of(robot: FlexibleRobot, root: etree._Element) -> Iterator[Finding]:
+    """What is impossible or doubtful about a robot's masses.
 
     Args:
         robot: with all its masses.
         root: of its URDF, for the links' shapes.
     """
     tree = robot.tree
+    arm = [joint for joint in tree.chain(robot.tool_frame) if joint.type in MOVABLE]
+    for joint in arm[:1]:
+        for link in tree.beyond(joint.name):
+            body = tree.links[link]
+            if body is not None and (reason := bad_inertia(body)):
+                yield Finding(f"link {link!r}", reason, severity="impossible")
     moving = moving_links(robot)
     if massless := [link for link in moving if _is_bare(tree, link, root)]:
-        yield f"no mass is given for {_list(massless)}, nor for what is fixed to it"
+        yield Finding(_links(massless), "no mass is given, nor for what is fixed to it")
     # What a sidecar states, it answers for. Hands have many equal fingers, so only the links that
     # carry the tool are compared.
     chain = {
@@ -64,8 +72,8 @@ def doubts_about_masses(robot: FlexibleRobot, root: etree._Element) -> Iterator[
         yield from _equal(chain, "inertia", lambda body: body.inertia if any(body.inertia) else 0)
         alike = [link for link, body in chain.items() if _is_round(body)]
         if len(alike) > 1:
-            yield (f"the inertias of {_list(alike)} are round numbers, alike about every axis: "
-                   "placeholders?")  # fmt: skip
+            yield Finding(_links(alike), "inertias of a round number, alike about every axis",
+                          "placeholders?")  # fmt: skip
         yield from _sizes(tree, chain, root)
     yield from _frequencies(robot)
 
@@ -87,20 +95,23 @@ def _is_bare(tree: UrdfTree, link: str, root: etree._Element) -> bool:
     return any(children(element, tag) for element in elements for tag in ("visual", "collision"))
 
 
-def _list(links: Sequence[str]) -> str:
-    return ", ".join(links[:8]) + (f" and {len(links) - 8} more" if len(links) > 8 else "")
+def _links(links: Sequence[str]) -> str:
+    some = ", ".join(map(repr, links[:8])) + (
+        f" and {len(links) - 8} more" if len(links) > 8 else ""
+    )
+    return f"link{'s' * (len(links) > 1)} {some}"
 
 
 def _equal(
     chain: dict[str, Inertial], what: str, key: Callable[[Inertial], object]
-) -> Iterator[str]:
+) -> Iterator[Finding]:
     """Links that share one value: a placeholder."""
     count = Counter(value for body in chain.values() if (value := key(body)))
     for value, times in count.most_common(1):
         if times >= max(_LEAST_EQUAL, 0.5 * len(chain)):
             same = [link for link, body in chain.items() if key(body) == value]
             each = f" of {value:g} kg" if isinstance(value, float) else ""
-            yield f"{times} links have the same {what}{each}: {_list(same)}: placeholders?"
+            yield Finding(_links(same), f"the same {what}{each}", "placeholders?")
 
 
 def _is_round(body: Inertial) -> bool:
@@ -112,7 +123,7 @@ def _is_round(body: Inertial) -> bool:
     return abs(power - round(power)) < 1e-9
 
 
-def _sizes(tree: UrdfTree, chain: dict[str, Inertial], root: etree._Element) -> Iterator[str]:
+def _sizes(tree: UrdfTree, chain: dict[str, Inertial], root: etree._Element) -> Iterator[Finding]:
     carried_by = {joint.child: joint for joint in tree.joints.values()}
     for link, body in chain.items():
         ends = [np.zeros(3), *(np.array(j.xyz) for j in tree.joints.values() if j.parent == link)]
@@ -130,9 +141,12 @@ def _sizes(tree: UrdfTree, chain: dict[str, Inertial], root: etree._Element) -> 
             what = "as little as a point's"
         else:
             continue
-        yield (f"link {link!r}: an inertia of {body.mass * gyration**2:.3g} kg m^2 for "
-               f"{body.mass:.3g} kg is {what}; as a solid of its shape it would have "
-               f"{solid:.3g}; correct it, or state it with a source in [link.{link}]")  # fmt: skip
+        yield Finding(
+            f"link {link!r}",
+            f"an inertia of {body.mass * gyration**2:.3g} kg m^2 for {body.mass:.3g} kg is "
+            f"{what}; as a solid of its shape it would have {solid:.3g}",
+            f"correct it, or state it with a source in [link.{link}]",
+        )
 
 
 def _shape(root: etree._Element, tree: UrdfTree, link: str) -> Body | None:
@@ -146,7 +160,7 @@ def _shape(root: etree._Element, tree: UrdfTree, link: str) -> Body | None:
     return None
 
 
-def _frequencies(robot: FlexibleRobot) -> Iterator[str]:
+def _frequencies(robot: FlexibleRobot) -> Iterator[Finding]:
     """Modes that no arm's joint has."""
     rows = [k for k, name in enumerate(robot.flexible_names) if name in robot.tree.joints]
     if not rows:
@@ -166,8 +180,9 @@ def _frequencies(robot: FlexibleRobot) -> Iterator[str]:
             continue  # of an estimate it tells nothing
         inertia, stiffness = joint.units.of("kg*m^2"), joint.units.of("N*m/rad")
         link = robot.tree.joints[joint.name].child
-        yield (
-            f"joint {joint.name!r} would vibrate at {frequency:,.3g} Hz (joints of arms: 4 to "
-            f"850 Hz): its stiffness of {joint.stiffness:.3g} {stiffness}, or the inertia of "
-            f"{mass[k, k]:.3g} {inertia} that link {link!r} and those beyond it have, is wrong"
+        yield Finding(
+            f"joint {joint.name!r}",
+            f"would vibrate at {frequency:,.3g} Hz (joints of arms: 4 to 850 Hz)",
+            f"its stiffness of {joint.stiffness:.3g} {stiffness}, or the inertia of "
+            f"{mass[k, k]:.3g} {inertia} that link {link!r} and those beyond it have, is wrong",
         )
