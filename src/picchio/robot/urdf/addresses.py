@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from functools import cache
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
+from urllib.parse import unquote
 
 from picchio.core.errors import InputError
+
+_IN_PACKAGES = ("package://", "model://")
+# Where each variable's folders keep their packages.
+_VARIABLES = {"ROS_PACKAGE_PATH": "", "AMENT_PREFIX_PATH": "share", "GAZEBO_MODEL_PATH": "",
+              "GZ_SIM_RESOURCE_PATH": ""}  # fmt: skip
 
 
 @cache
@@ -25,13 +32,17 @@ def example_share() -> Path | None:
 
 
 def package_roots() -> list[Path]:
-    """Folders in which `package://<name>/...` is looked up.
+    """Folders in which `package://<name>/...` and `model://<name>/...` are looked up.
 
     Returns:
-        those of ROS_PACKAGE_PATH, then example-robot-data's.
+        those of ROS 1, ROS 2 and Gazebo, by their variables, then example-robot-data's.
     """
-    listed = os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep)
-    roots = [Path(entry) for entry in listed if entry]
+    roots = [
+        Path(entry) / inside
+        for variable, inside in _VARIABLES.items()
+        for entry in os.environ.get(variable, "").split(os.pathsep)
+        if entry
+    ]
     share = example_share()
     return [*roots, share] if share else roots
 
@@ -45,22 +56,15 @@ def resolve_package(address: str) -> Path:
     Raises:
         InputError: in none of the roots.
     """
-    inside = address.removeprefix("package://")
-    for root in package_roots():
-        # A root may hold the package, or be it.
-        for path in (root / inside, root.parent / inside):
-            if path.is_file():
-                return path
-    raise InputError("no package root has this file", value=address,
-                     choices=[str(root) for root in package_roots()],
-                     hint="set ROS_PACKAGE_PATH")  # fmt: skip
+    return _resolve(address, None)
 
 
 def resolve_mesh(address: str, folder: Path) -> Path:
     """The file behind a mesh address.
 
     Args:
-        address: a `package://` address, or a path.
+        address: a `package://` or `model://` address, or a path; written with backslashes or
+            percent signs, as Windows and the web have them, where no file has just this name.
         folder: of the URDF, from which paths count.
 
     Raises:
@@ -68,18 +72,30 @@ def resolve_mesh(address: str, folder: Path) -> Path:
     """
     if address.startswith(("http:", "https:", "ftp:")):
         raise InputError("meshes are not fetched from the network", value=address)
-    if address.startswith("package://"):
-        try:
-            return resolve_package(address)
-        except InputError:
-            # A checkout keeps its packages above its URDF.
-            inside = address.removeprefix("package://")
-            for above in folder.resolve().parents:
-                for path in (above / inside, above / inside.partition("/")[2]):
-                    if path.is_file():
-                        return path
-            raise
-    path = folder / address.removeprefix("file://")
-    if not path.is_file():
+    return _resolve(address, folder)
+
+
+def _resolve(address: str, folder: Path | None) -> Path:
+    slashes = address.replace("\\", "/")
+    for spelling in dict.fromkeys((address, slashes, unquote(address), unquote(slashes))):
+        for path in _places(spelling, folder):
+            if path.is_file():
+                return path
+    if not address.startswith(_IN_PACKAGES):
         raise InputError("no such mesh file", value=address)
-    return path
+    raise InputError("no package root has this file", value=address,
+                     choices=[str(root) for root in package_roots()],
+                     hint=f"set {' or '.join(list(_VARIABLES)[:2])}")  # fmt: skip
+
+
+def _places(address: str, folder: Path | None) -> Iterator[Path]:
+    if address.startswith(_IN_PACKAGES):
+        inside = address.partition("://")[2]
+        for root in package_roots():
+            # A root may hold the package, or be it.
+            yield from (root / inside, root.parent / inside)
+        # A checkout keeps its packages above its URDF.
+        for above in folder.resolve().parents if folder else ():
+            yield from (above / inside, above / inside.partition("/")[2])
+    elif folder is not None:
+        yield folder / address.removeprefix("file://")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,8 +10,16 @@ import numpy as np
 from lxml import etree
 
 from picchio.core.arrays import symmetric
-from picchio.core.errors import InputError
-from picchio.robot.urdf.tree import MOVABLE, Inertial, UrdfJoint, UrdfTree, read_joints, read_links
+from picchio.core.errors import InputError, describe_choices
+from picchio.robot.urdf.tree import (
+    ATTRIBUTES,
+    MOVABLE,
+    Inertial,
+    UrdfJoint,
+    UrdfTree,
+    read_joints,
+    read_links,
+)
 from picchio.robot.urdf.xml import local_name
 
 # Pinocchio's reader recurses link by link, and dense matrices grow with the square.
@@ -52,8 +61,26 @@ def _tree(root: etree._Element, path: Path) -> UrdfTree:
         if count > most:
             raise InputError(f"has {count} {what}; at most {most} are accepted")
     base = _root_link(links, joints)
-    remarks = _settle_mimics(joints)
-    return UrdfTree(name, links, joints, base, path, tuple(remarks))
+    remarks = (*_unread(root), *_settle_mimics(joints))
+    return UrdfTree(name, links, joints, base, path, remarks)
+
+
+def _unread(root: etree._Element) -> Iterator[str]:
+    """The attributes that URDF 1.2 does not have, of the elements that place, weigh and limit."""
+    found: dict[tuple[str, str], list[str]] = {}
+    for owner in root:
+        # What stands deeper is a simulator's own; what has a prefix is its own language's.
+        for element in owner.iterfind("*") if owner.tag in ("link", "joint") else ():
+            for part in (element, *element.iterfind("*")):
+                for name in map(str, part.attrib):
+                    if name in ATTRIBUTES.get(str(part.tag), name) or name.startswith("{"):
+                        continue
+                    where = f"{owner.tag} {owner.get('name')}"
+                    found.setdefault((str(part.tag), name), []).append(where)
+    for (tag, name), owners in found.items():
+        some = ", ".join(dict.fromkeys(owners[:4])) + (" ..." if len(owners) > 4 else "")
+        yield (f"<{tag}> has no attribute {name!r}, so it is not read (in {some}); "
+               f"{describe_choices(name, ATTRIBUTES[tag])}")  # fmt: skip
 
 
 def _root_link(links: dict[str, Inertial | None], joints: dict[str, UrdfJoint]) -> str:

@@ -15,12 +15,14 @@ from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.core.files import regular_file
 from picchio.robot.urdf.addresses import resolve_mesh
+from picchio.robot.urdf.tree import read_origin
 from picchio.robot.urdf.xml import children
 
 _MOST_BYTES = 64 << 20
 _FORMATS = (".dae", ".stl", ".obj", ".ply", ".off", ".glb", ".gltf", ".3mf")
 # The attributes that give a primitive its size, and how many numbers each holds.
-_SIZES = {"box": {"size": 3}, "cylinder": {"radius": 1, "length": 1}, "sphere": {"radius": 1}}
+_ROUND = {"radius": 1, "length": 1}
+_SIZES = {"box": {"size": 3}, "cylinder": _ROUND, "capsule": _ROUND, "sphere": {"radius": 1}}
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,8 +32,9 @@ class Shape:
     Attributes:
         link: whose it is.
         matrix: (4, 4) in the link's frame, a mesh's scale included.
-        kind: "box", "cylinder", "sphere" or "mesh".
-        size: m: three edges; radius and length, along z; radius; nothing of a mesh.
+        kind: "box", "cylinder", "capsule", "sphere" or "mesh".
+        size: m: three edges; radius and length along z, a capsule's without its round ends;
+            radius; nothing of a mesh.
         file: the mesh's, or None.
     """
 
@@ -51,11 +54,15 @@ class Shape:
 
         if self.file is not None:
             return load_parts(self.file)
-        if self.kind == "box":
-            return [creation.box(extents=self.size)]
-        if self.kind == "cylinder":
-            return [creation.cylinder(radius=self.size[0], height=self.size[1], sections=40)]
-        return [creation.icosphere(radius=self.size[0], subdivisions=3)]
+        size = dict(zip(("radius", "height"), self.size, strict=False))
+        match self.kind:
+            case "box":
+                return [creation.box(extents=self.size)]
+            case "cylinder":
+                return [creation.cylinder(**size, sections=40)]
+            case "capsule":
+                return [creation.capsule(**size)]
+        return [creation.icosphere(**size, subdivisions=3)]
 
 
 def read_shape(link: str, element: etree._Element, folder: Path) -> Shape:
@@ -135,13 +142,9 @@ def origin(element: etree._Element) -> FloatArray:
         element: of the URDF.
 
     Raises:
-        InputError: not as many finite numbers as there must be.
+        InputError: as `read_origin`.
     """
-    found = children(element, "origin")
-    if not found:
-        return np.eye(4)
-    xyz = finite_numbers(found[0].get("xyz", "0 0 0"), 3)
-    return placement(xyz, finite_numbers(found[0].get("rpy", "0 0 0"), 3))
+    return placement(*read_origin(element))
 
 
 def finite_numbers(text: str, count: int) -> FloatArray:

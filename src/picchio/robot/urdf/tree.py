@@ -11,8 +11,10 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
+from typing import TypeVar, cast
 
+import numpy as np
+import pinocchio as pin
 from lxml import etree
 
 from picchio.core.arrays import Vector
@@ -21,11 +23,23 @@ from picchio.robot.units import JointUnits, units_of
 from picchio.robot.urdf.xml import EXPAND, children, local_name
 
 T = TypeVar("T")
+Numbers = TypeVar("Numbers", bound=tuple[float, ...])
+_COUNTS = {3: "three", 4: "four"}
+_UNIT_LENGTH = 0.01  # how far rounding may leave a quaternion from the length 1
 MOVABLE = ("revolute", "continuous", "prismatic")
 LOCKED = ("floating", "planar")
 JOINT_TYPES = (*MOVABLE, *LOCKED, "fixed")
 ZERO: Vector = (0.0, 0.0, 0.0)
 INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+# Of URDF 1.2, which has more limits than are used here.
+ATTRIBUTES = {
+    "origin": ("xyz", "rpy", "quat_xyzw"),
+    "mass": ("value",),
+    "inertia": INERTIA,
+    "axis": ("xyz",),
+    "limit": ("lower", "upper", "effort", "velocity", "acceleration", "deceleration", "jerk"),
+    "mimic": ("joint", "multiplier", "offset"),
+}
 # Above this a sum of squares in the dynamics is on its way to overflow.
 LARGEST = 1e12
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\Z")
@@ -189,7 +203,7 @@ def _inertial(link: etree._Element, name: str) -> Inertial | None:
     if value < 0:
         raise InputError("the mass is negative", value=value)
     tensor = tuple(_number(inertia[0], each) for each in INERTIA)
-    return Inertial(value, *_origin(found[0]), tensor)
+    return Inertial(value, *read_origin(found[0]), tensor)
 
 
 def _joint(element: etree._Element, name: str) -> UrdfJoint:
@@ -198,10 +212,10 @@ def _joint(element: etree._Element, name: str) -> UrdfJoint:
         raise InputError("unknown joint type", value=kind, choices=JOINT_TYPES)
     axis: Vector = (1.0, 0.0, 0.0)
     if kind in MOVABLE and (found := children(element, "axis")):
-        axis = _three_numbers(found[0], "xyz", axis)
+        axis = _several(found[0], "xyz", axis)
         if not any(abs(part) > 1e-12 for part in axis):
             raise InputError("the axis has length zero", value=axis)
-    xyz, rpy = _origin(element)
+    xyz, rpy = read_origin(element)
     return UrdfJoint(name, kind, _end(element, "parent"), _end(element, "child"), xyz, rpy, axis,
                      *_limits(element, kind),
                      _mimic(element) if kind in MOVABLE else None)  # fmt: skip
@@ -238,9 +252,29 @@ def _mimic(element: etree._Element) -> Mimic | None:
     return None
 
 
-def _origin(element: etree._Element) -> tuple[Vector, Vector]:
+def read_origin(element: etree._Element) -> tuple[Vector, Vector]:
+    """Where an element's `<origin>` is, m, and how it is turned, roll, pitch and yaw in rad.
+
+    Args:
+        element: of the URDF; without an origin it is at zero.
+
+    Raises:
+        InputError: malformed numbers, two rotations, a quaternion that is none.
+    """
     for found in children(element, "origin"):
-        return _three_numbers(found, "xyz", ZERO), _three_numbers(found, "rpy", ZERO)
+        xyz, rpy = _several(found, "xyz", ZERO), _several(found, "rpy", ZERO)
+        if found.get("quat_xyzw") is None:
+            return xyz, rpy
+        if found.get("rpy") is not None:
+            raise InputError("<origin> has both rpy and quat_xyzw: one rotation is enough")
+        four = np.array(_several(found, "quat_xyzw", (0.0,) * 4))
+        length = float(np.linalg.norm(four))
+        if abs(length - 1.0) > _UNIT_LENGTH:
+            raise InputError(f"<origin quat_xyzw> is no rotation: its length is {length:.4g}, not "
+                             "1", value=found.get("quat_xyzw"))  # fmt: skip
+        matrix = pin.Quaternion(four / length).toRotationMatrix()
+        roll, pitch, yaw = pin.rpy.matrixToRpy(matrix).tolist()
+        return xyz, (roll, pitch, yaw)
     return ZERO, ZERO
 
 
@@ -291,16 +325,16 @@ def _number(
     return _numbers(element, attribute, [text], infinite)[0]
 
 
-def _three_numbers(element: etree._Element, attribute: str, default: Vector) -> Vector:
-    """Three numbers from an attribute, such as xyz or rpy."""
+def _several(element: etree._Element, attribute: str, default: Numbers) -> Numbers:
+    """Numbers from an attribute, such as xyz or rpy: as many as the default has."""
     text = element.get(attribute)
     if text is None:
         return default
     parts = text.split()
-    if len(parts) != 3:
-        raise InputError(f"<{local_name(element)} {attribute}> needs three numbers", value=text)
-    x, y, z = _numbers(element, attribute, parts)
-    return x, y, z
+    if len(parts) != len(default):
+        raise InputError(f"<{local_name(element)} {attribute}> needs {_COUNTS[len(default)]} "
+                         "numbers", value=text)  # fmt: skip
+    return cast(Numbers, tuple(_numbers(element, attribute, parts)))
 
 
 def _numbers(
