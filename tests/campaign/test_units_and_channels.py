@@ -12,8 +12,8 @@ from picchio.campaign.channels import (
 )
 from picchio.campaign.readers import velocity
 from picchio.campaign.record import Record
-from picchio.campaign.units import conversion
 from picchio.core.errors import InputError, PicchioWarning
+from picchio.core.units import conversion
 from picchio.model.effects.registry import effect_class
 from picchio.model.model import Model
 from picchio.prediction.percussion import percussion_setups
@@ -47,6 +47,23 @@ FACTORS = [
     ("torque.j [kN*m]", 1e3),
     ("torque.j [N·m]", 1.0),
     ("torque.j [ft*lbf]", 0.3048 * 4.4482216152605),
+    ("torque.j [N.m]", 1.0),
+    ("torque.j [N-m]", 1.0),
+    ("torque.j [N m]", 1.0),
+    ("torque.j [lbf.in]", 0.0254 * 4.4482216152605),
+    ("torque.j [ft-lb]", 0.3048 * 4.4482216152605),
+    ("torque.j [kgf.cm]", 0.0980665),
+    ("torque.j [cNm]", 1e-2),
+    ("torque.j [NM]", 1.0),
+    ("force [KN]", 1e3),
+    ("force [lb]", 4.4482216152605),
+    ("velocity.j [°/s]", np.pi / 180),
+    ("acceleration.tool.x [m·s⁻²]", 1.0),
+    ("acceleration.tool.x [M/S^2]", 1.0),
+    ("acceleration.tool.x [m s-2]", 1.0),
+    ("acceleration.tool.x [in/s^2]", 0.0254),
+    ("acceleration.tool.x [G]", 9.80665),
+    ("displacement.tool.x [μm]", 1e-6),
     ("torque.j [kN]", 1e3),
 ]
 
@@ -55,6 +72,32 @@ FACTORS = [
 def test_units_become_si(header, factor):
     _, convert = parse_header(header)
     np.testing.assert_allclose(convert(np.array([0.0, 2.0])), [0.0, 2.0 * factor], rtol=5e-16)
+
+
+# Functions of an accelerometer, of a velocity and of a displacement by a hammer, over m/s^2/N,
+# m/s/N and m/N; the pound force and the inch as above.
+QUOTIENTS = [
+    ("g/N", 9.80665),
+    ("G/N", 9.80665),
+    ("mg/N", 9.80665e-3),
+    ("(1/N)*(m/s^2)", 1.0),
+    ("(1/N)*(m/s²)", 1.0),
+    ("(1/N)*(m/s\ufffd)", 1.0),  # Latin-1 read as UTF-8
+    ("(m/s2)/kN", 1e-3),
+    ("g/lbf", 9.80665 / 4.4482216152605),
+    ("in/s^2/lb", 0.0254 / 4.4482216152605),
+    ("mm/s/N", 1e-3),
+    ("m/Ns", 1.0),
+    ("µm/N", 1e-6),
+]
+
+
+@pytest.mark.parametrize(("unit", "factor"), QUOTIENTS)
+def test_units_of_frequency_response_functions(unit, factor):
+    target, convert = conversion(unit, ("m/s^2/N", "m/s/N", "m/N"))
+    assert convert.scale == pytest.approx(factor, rel=1e-12)
+    assert target == ("m/s/N" if unit in ("mm/s/N", "m/Ns") else
+                      "m/N" if unit == "µm/N" else "m/s^2/N")  # fmt: skip
 
 
 def test_temperatures_have_their_own_zero():
@@ -75,6 +118,11 @@ def test_temperatures_have_their_own_zero():
         ("torque.j [J/K]", ["torque.j"]),
         ("acceleration.tool.x [rad/s^2]", ["m/s^2"]),
         ("time [9**9**9*s]", ["not a unit"]),
+        ("force [Ns]", ["multiple of N", "'Ns'"]),
+        ("force [counts]", ["not a unit", "valid: N, kN, lbf"]),
+        ("acceleration.tool.x [V]", ["not a unit", "m/s^2, g, mm/s^2"]),
+        ("deflection.j [MM]", ["several units", "did you mean 'mm'?"]),
+        ("displacement.tool.x [min]", ["multiple of m"]),
         ("time [__import__('os')]", ["not a unit"]),
         ("force", ["channel [unit]"]),
         ("force [N", ["channel [unit]"]),

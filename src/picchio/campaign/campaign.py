@@ -26,7 +26,7 @@ from picchio.campaign.tables import (
     RecordTable,
     Tolerance,
 )
-from picchio.campaign.uff import frf_source
+from picchio.campaign.uff import ORDINATE, frf_source
 from picchio.core.errors import InputError, warn_user
 from picchio.core.files import recover, relative_name, swap_in, umask, writing
 from picchio.core.toml import parse_toml, validate
@@ -242,6 +242,12 @@ def _check_record(record: Record, key: str, file: Path | None) -> None:
                                  file=file, key=f"{key}.{name}")  # fmt: skip
         if missing := [name for name in ("real", "imag") if name not in record.channels]:
             raise record.source.error("has no such column", channel=missing[0])
+        wanted = f"{ORDINATE[record.table.quantity or 'accelerance'][1]}/N"
+        units = [record.channel(name).unit for name in ("real", "imag")]
+        if units[0] != units[1] or units[0] not in ("1", wanted):
+            raise record.source.error("both parts must be in the unit of the record's quantity",
+                                      channel="real, imag", value=" and ".join(units),
+                                      choices=[f"a multiple of {wanted}"])  # fmt: skip
     if record.kind == "clamped":
         if record.pose is None:
             raise InputError(f"a clamped record ({record.file}) needs this key",

@@ -15,9 +15,9 @@ from typing import Literal
 
 from picchio.campaign import readers
 from picchio.campaign.readers import Reader
-from picchio.campaign.units import Conversion, conversion
 from picchio.core.errors import InputError
 from picchio.core.registry import with_entry_points
+from picchio.core.units import Conversion, conversion
 
 AXES = ("x", "y", "z")
 TIME = "time"
@@ -151,10 +151,11 @@ LOG_KINDS: tuple[ChannelKind, ...] = (
 )
 """What a log may hold beside a record's channels, for `picchio count`."""
 FREQUENCY = "frequency"
+_QUOTIENTS = ("m/s^2/N", "m/s/N", "m/N")
 FRF_KINDS: tuple[ChannelKind, ...] = (
     ChannelKind(FREQUENCY, None, ("Hz",), meaning="ascending; the first column"),
-    ChannelKind("real", None, ("1",), meaning="real part, SI: (m/s^2)/N, (m/s)/N or m/N"),
-    ChannelKind("imag", None, ("1",), meaning="imaginary part, likewise"),
+    ChannelKind("real", None, ("1", *_QUOTIENTS), meaning="real part; SI where no unit is told"),
+    ChannelKind("imag", None, ("1", *_QUOTIENTS), meaning="imaginary part, likewise"),
     ChannelKind("coherence", None, ("1",), meaning="0 to 1; what is low counts little"),
 )
 """The columns of a frequency response function, a row a line."""
@@ -281,7 +282,7 @@ def parse_header(cell: str, among: tuple[ChannelKind, ...] = ()) -> tuple[Channe
     """
     text = cell.strip()
     name, bracket, rest = text.partition("[")
-    if not bracket and any(k.units == ("1",) and _split(text, k) for k in among):
+    if not bracket and any(k.units[0] == "1" and _split(text, k) for k in among):
         return parse_channel(text, None, among)
     if not bracket or not rest.endswith("]") or "[" in rest:
         raise InputError("a column's header must be 'channel [unit]'", value=text)

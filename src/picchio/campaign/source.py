@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from picchio.campaign.channels import TIME, Channel, ChannelKind, parse_header
-from picchio.campaign.units import Conversion
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.core.files import regular_file
+from picchio.core.units import Conversion
 
 Samples = dict[str, FloatArray]
 Block = tuple[int, Samples]

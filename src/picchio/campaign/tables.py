@@ -210,6 +210,8 @@ class RecordTable(StrictModel):
             ((m/s)/N) or receptance (m/N).
         response: frf only: which function of a UFF file, by response node and direction: "12+X".
         reference: frf only: likewise, by reference node and direction.
+        function: frf only: likewise, by its number among the functions of the file, from 1, or by
+            one of the lines that name it there: "H1 : # 2 / # 1".
         joint_map: static only: how the angles of the controller become the URDF's. For each
             joint that differs: the factors of the columns `pose.<name>` whose sum it is, such as
             `joint_3 = { joint_2 = -1, joint_3 = -1 }`, and an `offset` (rad or m) that is added.
@@ -238,6 +240,7 @@ class RecordTable(StrictModel):
     quantity: Literal["accelerance", "mobility", "receptance"] | None = None
     response: Name | None = None
     reference: Name | None = None
+    function: Annotated[int, Field(ge=1, strict=True)] | Name | None = None
     direction: Direction | None = None
     excitation: CampaignExcitation | None = None
     hits: Hits | None = None
@@ -263,8 +266,8 @@ class RecordTable(StrictModel):
 
     def frf_keys(self) -> list[str]:
         """The keys given here that only a frequency response function has a use for."""
-        names = [name for name in type(self).model_fields
-                 if name.startswith(("force_", "response", "reference", "quantity"))]  # fmt: skip
+        of_frf = ("force_", "response", "reference", "function", "quantity")
+        names = [name for name in type(self).model_fields if name.startswith(of_frf)]
         return [name for name in names if getattr(self, name) is not None]
 
 

@@ -16,9 +16,9 @@ from picchio.campaign.importing.mapping import JoinTable, Mapping, TimeTable
 from picchio.campaign.importing.named import named
 from picchio.campaign.importing.raw import RawChannel, RawFile
 from picchio.campaign.importing.resample import clocked, taken_samples
-from picchio.campaign.units import Conversion
 from picchio.core.arrays import FloatArray, IndexArray
 from picchio.core.errors import InputError
+from picchio.core.units import Conversion
 from picchio.robot.flexible_robot import FlexibleRobot
 
 KINDS = ("force", "acceleration", "trigger", "poses")

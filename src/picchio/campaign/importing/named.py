@@ -12,8 +12,8 @@ from picchio.campaign.channels import LOG_KINDS, TIME, ChannelKind, kinds, parse
 from picchio.campaign.importing.detect import clock, implausible
 from picchio.campaign.importing.mapping import ChannelTable
 from picchio.campaign.importing.raw import RawChannel, RawFile
-from picchio.campaign.units import conversion
 from picchio.core.errors import InputError
+from picchio.core.units import conversion
 
 _UNIT = re.compile(
     r"(?P<name>.*?\S)\s*[\[(<]\s*(?P<unit>[^\d\[\](<>][^\[\](<>]*(\([^()]*\)[^\[\](<>]*)?)[\])>]"

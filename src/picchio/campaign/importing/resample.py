@@ -13,9 +13,9 @@ from picchio.campaign.clock import TOLERANCE, not_seconds
 from picchio.campaign.importing import detect
 from picchio.campaign.importing.mapping import FilterTable, TimeTable
 from picchio.campaign.importing.raw import RawChannel, RawFile
-from picchio.campaign.units import conversion
 from picchio.core.arrays import BoolArray, FloatArray
 from picchio.core.errors import InputError, warn_user
+from picchio.core.units import conversion
 
 # A hole of more usual steps than this is a dropout, over which nothing may be drawn.
 _LARGEST_GAP = 5.0

@@ -10,14 +10,13 @@ import numpy as np
 
 from picchio.campaign.importing.isolated import Limits
 from picchio.campaign.importing.raw import Names, RawChannel, RawFile
-from picchio.campaign.uff import data_sets, place
+from picchio.campaign.uff import data_sets, label_of, place
 from picchio.core.errors import InputError, warn_user
 
 LIMITS = Limits(memory_a_byte=32.0)
 # Function types of data set 58 that are histories in time: general, and time response.
 _TIME_HISTORIES = (0, 1)
 _TIME_ABSCISSA = (0, 17)
-_NO_UNIT = ("", "none", "unknown")
 
 
 def read(path: Path, clock: Mapping[str, Any]) -> RawFile:
@@ -61,12 +60,11 @@ def _channel(data: dict[str, Any], unique: Names, path: Path) -> RawChannel:
     if values.size != int(data.get("num_pts", values.size)):
         raise InputError(f"must hold {int(data['num_pts'])} samples as its header says", file=path,
                          key=name, value=values.size)  # fmt: skip
-    unit = str(data.get("ordinate_axis_units_lab") or "").strip()
     label = " ".join(str(data.get(key) or "").strip() for key in ("id1", "rsp_ent_name"))
     return RawChannel(
         name,
         values.astype(np.float64),
         np.asarray(data["x"], dtype=np.float64),
-        None if unit.lower() in _NO_UNIT else unit,
+        label_of(data, "ordinate"),
         note=label.strip(),
     )
