@@ -8,7 +8,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 import picchio
 from picchio.core.processes import one_thread
-from picchio.diagnosis.workers import worker_pool
+from picchio.core.workers import worker_pool
 
 
 def blas_threads(_=None):

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import os
-import shutil
-import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -28,8 +27,9 @@ from picchio.campaign.tables import (
 )
 from picchio.campaign.uff import ORDINATE, frf_source
 from picchio.core.errors import InputError, warn_user
-from picchio.core.files import recover, relative_name, swap_in, umask, writing
+from picchio.core.files import part_of, recover, relative_name, swap_in, writing
 from picchio.core.toml import parse_toml, validate
+from picchio.core.unfinished import unfinished
 
 MAPPING_FILE = "mapping.toml"
 
@@ -197,17 +197,10 @@ class Campaign:
         _check_target(target, overwrite)
         if suffix is not None and suffix not in SUFFIXES:
             raise InputError("unknown kind of file", value=suffix, choices=SUFFIXES)
-        with writing(target):
-            temporary = Path(
-                tempfile.mkdtemp(prefix=f".{target.name}.", suffix=".part", dir=target.parent)
-            )
-            try:
-                os.chmod(temporary, 0o777 & ~umask())
-                _fill(self, temporary, target, suffix, extra_files or {})
-                load_campaign(temporary)
-                swap_in(temporary, target)
-            finally:
-                shutil.rmtree(temporary, ignore_errors=True)
+        with writing(target), unfinished(partial(part_of, target, folder=True)) as temporary:
+            _fill(self, temporary, target, suffix, extra_files or {})
+            load_campaign(temporary)
+            swap_in(temporary, target)
         return load_campaign(target)
 
     def _check(self) -> None:

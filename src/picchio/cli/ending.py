@@ -1,20 +1,25 @@
-"""Asked to end, by Ctrl-C or a signal, a command does within a moment, and tidies up first."""
+"""Asked to end, by Ctrl-C or a signal, a command does within a moment, and tidies up first.
+
+It imports next to nothing, so that it holds from the first moment.
+"""
 
 from __future__ import annotations
 
 import _thread
+import os
 import signal
 import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
-from typing import Any
+from typing import Any, NoReturn
 
 # What compiles kernels crashes where it is left in the midst of it.
 _NOT_LEFT = "llvmlite.binding"
 _AGAIN = 0.05  # s
+_GRACE = 0.6  # s for tidying up; then the process ends where it stands
 
 
 class Terminated(BaseException):
@@ -22,6 +27,8 @@ class Terminated(BaseException):
 
 
 _RAISED = {signal.SIGINT: KeyboardInterrupt, signal.SIGTERM: Terminated}
+_TOLD = {signal.SIGINT: ("interrupted", 130), signal.SIGTERM: ("terminated", 143)}
+STATUSES = tuple(status for _, status in _TOLD.values())
 
 
 class Ending:
@@ -36,10 +43,15 @@ class Ending:
         self._asked: signal.Signals | None = None
         self._reminding = False
         self._one = threading.Lock()
+        self._heard_at = -1.0
 
     @contextmanager
-    def obeyed(self) -> Iterator[None]:
+    def obeyed(self, at_last: bool = False) -> Iterator[None]:
         """Within the block, signals to end are raised: KeyboardInterrupt or `Terminated`.
+
+        Args:
+            at_last: end the process where nobody has heard it a moment later, such as in the midst
+                of a long call of compiled code.
 
         Returns:
             a context manager.
@@ -48,23 +60,72 @@ class Ending:
         kept = {n: handler for n, handler in before.items() if handler is not signal.SIG_IGN}
         for number in kept:
             signal.signal(number, self._ask)
+        if at_last and kept:
+            self._guard()
         try:
             yield
         finally:
             self.heard()
-            for number, handler in kept.items():
-                signal.signal(number, handler)
+            if at_last:
+                self.last()
+            else:
+                for number, handler in kept.items():
+                    signal.signal(number, handler)
 
     def heard(self) -> None:
         """It was dealt with: what comes now is to be finished."""
         with self._one:
             self._asked = None
+            self._heard_at = time.monotonic()
         if hasattr(signal, "pthread_sigmask"):  # a last reminder comes now, or never
             signal.pthread_sigmask(signal.SIG_BLOCK, ())
 
+    def told(self, error: BaseException) -> int:
+        """Say that the command was asked to end, and ask for no more.
+
+        Args:
+            error: that came of it.
+
+        Returns:
+            the exit status.
+        """
+        number = signal.SIGTERM if isinstance(error, Terminated) else signal.SIGINT
+        self.last()
+        word, status = _TOLD[number]
+        print(f"picchio: error: {word}", file=sys.stderr)
+        return status
+
+    def last(self) -> None:
+        """It ends now: who asks for it once more is not answered."""
+        for number in _RAISED:
+            if signal.getsignal(number) == self._ask:
+                signal.signal(number, signal.SIG_IGN)
+        self.heard()
+
+    def _guard(self) -> None:
+        """A thread that hears of a signal even while compiled code runs, and ends the process."""
+        asked, tells = os.pipe()
+        os.set_blocking(tells, False)
+        signal.set_wakeup_fd(tells, warn_on_full_buffer=False)
+
+        def wait() -> None:
+            while byte := os.read(asked, 1):
+                if byte[0] in _TOLD:
+                    woke = time.monotonic()
+                    while self._heard_at < woke - _AGAIN:
+                        time.sleep(0.5 * _AGAIN)
+                        if time.monotonic() > woke + _GRACE:
+                            word, status = _TOLD[signal.Signals(byte[0])]
+                            with suppress(OSError):
+                                os.write(2, f"picchio: error: {word}\n".encode())
+                            end_at_once(status)
+
+        threading.Thread(target=wait, name="picchio ending", daemon=True).start()
+
     def _ask(self, number: int, frame: FrameType | None) -> None:
         reminded, self._reminding = self._reminding, False
-        if reminded and (self._asked is None or _dealt_with(sys.exc_info()[1])):
+        once_more = reminded or self._asked is not None
+        if once_more and (self._asked is None or _dealt_with(sys.exc_info()[1])):
             return
         if self._asked is None:
             self._asked = signal.Signals(number)
@@ -84,6 +145,25 @@ class Ending:
                     signal.pthread_kill(threading.main_thread().ident or 0, self._asked)
                 else:
                     _thread.interrupt_main(self._asked)
+
+
+def end_at_once(status: int) -> NoReturn:
+    """End without waiting for threads and workers, which have nothing to say any more.
+
+    Args:
+        status: to exit with.
+    """
+    if "multiprocessing" in sys.modules:
+        import multiprocessing
+
+        for process in multiprocessing.active_children():
+            process.kill()
+    if (left := sys.modules.get("picchio.core.unfinished")) is not None:
+        left.clear()
+    with suppress(OSError, ValueError, RuntimeError):
+        sys.stdout.flush()
+        sys.stderr.flush()
+    os._exit(status)
 
 
 def _dealt_with(error: BaseException | None) -> bool:

@@ -14,10 +14,12 @@ import sys
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import IO, Any
 
 from picchio.core.errors import InputError, OutputError
+from picchio.core.unfinished import unfinished
 
 LARGEST = 32 << 20
 """Bytes of a file that people write."""
@@ -56,19 +58,27 @@ def atomic_write(path: str | Path, mode: str = "w") -> Iterator[IO[Any]]:
         raise InputError("cannot write here: the folder does not exist", file=path)
     if target.is_dir():
         raise InputError("cannot write a file over a folder", file=path)
-    with writing(path):
-        handle, name = tempfile.mkstemp(
-            prefix=f".{target.name}.", suffix=".part", dir=target.parent
-        )
-        temporary = Path(name)
-        try:
-            os.chmod(temporary, 0o666 & ~umask())
-            with os.fdopen(handle, mode, encoding=encoding) as stream:
-                yield stream
-            os.replace(temporary, target)
-        except BaseException:
-            temporary.unlink(missing_ok=True)
-            raise
+    with writing(path), unfinished(partial(part_of, target)) as temporary:
+        with open(temporary, mode, encoding=encoding) as stream:
+            yield stream
+        os.replace(temporary, target)
+
+
+def part_of(target: Path, *, folder: bool = False) -> Path:
+    """A new empty file or folder beside a target, which it is to replace; hidden by its name.
+
+    Args:
+        target: which may not exist yet.
+        folder: whether it is one.
+    """
+    prefix = f".{target.name}."
+    if folder:
+        made = tempfile.mkdtemp(".part", prefix, target.parent)
+    else:
+        handle, made = tempfile.mkstemp(".part", prefix, target.parent)
+        os.close(handle)
+    os.chmod(made, (0o777 if folder else 0o666) & ~umask())
+    return Path(made)
 
 
 @contextmanager
@@ -190,10 +200,10 @@ def locked(target: Path, *, patience: float = 0.0) -> Iterator[None]:
         except Timeout:
             raise OutputError("another process is writing it", file=target) from None
     try:
-        yield
+        # It goes while it is held: who waits for it sees that, and takes a new one.
+        with unfinished(lambda: file):
+            yield
     finally:
-        # While it is held: who waits for it sees that the name is gone, and takes a new one.
-        file.unlink(missing_ok=True)
         lock.release()
 
 

@@ -1,4 +1,4 @@
-"""Work that is spread over processes by dask: a cluster of our own, or somebody's scheduler."""
+"""Work that is spread over processes: our own, or those of somebody's dask scheduler."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ import asyncio
 import logging
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import suppress
+from functools import partial
 from typing import Any, TypeVar
 
 from picchio.core.errors import InputError
-from picchio.core.processes import safe_start
+from picchio.core.workers import as_done
 
 Part = TypeVar("Part")
 Done = TypeVar("Done")
@@ -30,36 +31,32 @@ def spread(
 
     Args:
         work: of a module, called with the job and a part.
-        job: what all parts share; it is sent once to each worker.
+        job: what all parts share; it is sent once to each worker of a scheduler.
         parts: any number.
-        workers: processes of a cluster of our own; as many as cores where None.
+        workers: processes of our own; as many as cores where None, eight at most.
         scheduler: address of a dask scheduler to use instead, as of `require_scheduler`.
 
     Returns:
         what each part gave, in any order.
     """
-    from distributed import Client, LocalCluster, as_completed
+    if scheduler is None:
+        yield from as_done(partial(work, job), parts, workers)
+        return
+    from distributed import Client, as_completed
 
-    with ExitStack() as opened:
-        opened.callback(logging.disable, logging.NOTSET)
-        cluster = None
-        if scheduler is None:
-            with safe_start():
-                cluster = LocalCluster(
-                    n_workers=workers, threads_per_worker=1, processes=True,
-                    dashboard_address=None, silence_logs=logging.CRITICAL,
-                    env={"NUMBA_NUM_THREADS": "1"},  # each core has a process already
-                )  # fmt: skip
-            opened.enter_context(cluster)
-        client = opened.enter_context(Client(cluster or scheduler))
-        # First of all at the end: what its tasks say of being stopped is of no use to anybody.
-        opened.callback(logging.disable)
-        shared = _sent(client, job)
-        futures = client.map(
-            work, [shared] * len(parts), list(parts), pure=False, retries=_RETRIES
-        )  # fmt: skip
-        for future in as_completed(futures):
-            yield future.result()
+    try:
+        with Client(scheduler) as client:
+            shared = _sent(client, job)
+            futures = client.map(
+                work, [shared] * len(parts), list(parts), pure=False, retries=_RETRIES
+            )  # fmt: skip
+            try:
+                for future in as_completed(futures):
+                    yield future.result()
+            finally:  # what its tasks say of being stopped is of no use to anybody
+                logging.disable()
+    finally:
+        logging.disable(logging.NOTSET)
 
 
 def _sent(client: Any, job: Any) -> Any:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
-from typing import TypeVar
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any, TypeVar
 
 from picchio.core.errors import InputError
 
@@ -33,3 +34,15 @@ def attempt(what: str, trial: Callable[[], Found]) -> Found | None:
     except Exception as error:
         _log.debug("%s failed: %s: %s", what, type(error).__name__, error, exc_info=True)
     return None
+
+
+def trials(functions: Mapping[str, Callable[[Any], Any]]) -> dict[str, Callable[[Any], Any]]:
+    """The same functions of one item, each of which gives None where it fails, as `attempt` does.
+
+    Args:
+        functions: by name, for the log.
+    """
+    return {
+        name: lambda item, name=name, function=function: attempt(name, partial(function, item))
+        for name, function in functions.items()
+    }

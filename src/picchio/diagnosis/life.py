@@ -15,7 +15,8 @@ from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.core.processes import one_thread
 from picchio.core.recent import Recent
-from picchio.diagnosis.workers import worker_pool
+from picchio.core.workers import worker_pool
+from picchio.diagnosis.attempt import trials
 from picchio.model.effects.effect import Effect
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
@@ -296,7 +297,7 @@ def life_intervals(
 
     functions: dict[str, Callable[[Any], Any]] = {"slope": slope, "used": used, "life": life}
     told: dict[str, dict[str, tuple[float, float]]] = {}
-    with one_thread(), worker_pool(workers, functions) as mapped:
+    with one_thread(), worker_pool(workers, trials(functions)) as mapped:
         slopes = _of_both(mapped("slope", spread.T), len(found.joints))
         points = [
             [

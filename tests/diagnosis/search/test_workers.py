@@ -14,6 +14,8 @@ import trial
 
 import picchio
 from picchio.core.errors import InputError
+from picchio.core.workers import Worker, shared_array, worker_pool
+from picchio.diagnosis.attempt import trials
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.fit.least_squares import fit
 from picchio.diagnosis.percussion.fit.parallel import parallel_records
@@ -21,7 +23,6 @@ from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.search.candidates import all_candidates, measure_scales
 from picchio.diagnosis.percussion.search.state import Search
 from picchio.diagnosis.percussion.search.trials import try_candidates
-from picchio.diagnosis.workers import Worker, shared_array, worker_pool
 from picchio.model.effects.registry import effect_class
 
 ARM = "fanuc_like_3dof"
@@ -73,7 +74,7 @@ def test_what_fails_in_a_worker_gives_nothing():
         return -item
 
     for workers in (1, 2):
-        with worker_pool(workers, {"fail": fail}) as mapped:
+        with worker_pool(workers, trials({"fail": fail})) as mapped:
             assert mapped("fail", [1, 2, 4]) == [-1, -2, -4]
             assert mapped("fail", [1, 3, 2]) == [-1, None, -2]
 

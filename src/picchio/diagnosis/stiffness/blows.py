@@ -18,6 +18,8 @@ import numpy as np
 from picchio.campaign.channels import Channel
 from picchio.campaign.tables import Tolerance
 from picchio.core.arrays import FloatArray
+from picchio.core.workers import worker_pool
+from picchio.diagnosis.attempt import trials
 from picchio.diagnosis.stiffness.fit import climb
 from picchio.diagnosis.stiffness.modes import TAILS, settled_elsewhere, starts
 from picchio.diagnosis.stiffness.prior import UNKNOWN, Prior
@@ -29,7 +31,6 @@ from picchio.diagnosis.stiffness.responses import (
     response_to,
 )
 from picchio.diagnosis.stiffness.taps import POWER, SAMPLED, Seen, Window, lines, transform
-from picchio.diagnosis.workers import worker_pool
 from picchio.robot.flexible_robot import FlexibleRobot
 
 _LONGEST = 3.0  # s of a record that are looked at: what rings longer hardly tells more
@@ -137,7 +138,7 @@ def rough(
         return float(off @ off) > _STRAINED**2 * len(shared)
 
     climbs = partial(climb, problem, tail=TAILS, astray=astray)
-    with worker_pool(workers, {"climb": climbs}) as mapped:
+    with worker_pool(workers, trials({"climb": climbs})) as mapped:
         climbed = [one for one in mapped("climb", places) if one and not astray(one.mean)]
     if not climbed:
         return None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import shutil
 import warnings
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -16,6 +15,7 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.core.files import swap_in, writing
+from picchio.core.unfinished import remove, unfinished
 from picchio.studies.maps.chunk import Columns
 
 # Rows written at a time, and of a piece of a Zarr store: a piece is then written once, not again
@@ -76,8 +76,6 @@ def join_chunks(target: Path, chunks: Iterable[Columns], attributes: dict[str, A
     Raises:
         InputError: there is no row at all: no point can be reached.
     """
-    part = target.with_name(f".{target.name}.part")
-    _remove(part)
     writer: type[_ZarrWriter | _NetcdfWriter]
     writer = _ZarrWriter if target.suffix == ".zarr" else _NetcdfWriter
     rows = 0
@@ -87,7 +85,7 @@ def join_chunks(target: Path, chunks: Iterable[Columns], attributes: dict[str, A
     labels = {name: np.array(values, dtype=object) for name, values in names.items()}
     others = {k: v for k, v in attributes.items() if k not in labelled}
     # Chunks may be computed only when they are asked for: their errors are not the disk's.
-    try:
+    with unfinished(lambda: _fresh(target)) as part:
         with ExitStack() as open_things:
             with writing(target):
                 out = writer(part, labels, others)
@@ -104,8 +102,6 @@ def join_chunks(target: Path, chunks: Iterable[Columns], attributes: dict[str, A
             )
         with writing(target):
             swap_in(part, target)
-    finally:
-        _remove(part)
 
 
 def _in_blocks(chunks: Iterable[Columns]) -> Iterator[Columns]:
@@ -124,11 +120,11 @@ def _in_blocks(chunks: Iterable[Columns]) -> Iterator[Columns]:
         yield {name: np.concatenate([part[name] for part in held]) for name in held[0]}
 
 
-def _remove(path: Path) -> None:
-    if path.is_dir():
-        shutil.rmtree(path)
-    else:
-        path.unlink(missing_ok=True)
+def _fresh(target: Path) -> Path:
+    """Where the map is written at first; nothing is there."""
+    part = target.with_name(f".{target.name}.part")
+    remove(part)
+    return part
 
 
 class _NetcdfWriter:

@@ -9,21 +9,21 @@ from __future__ import annotations
 
 import hashlib
 import json
-import shutil
 from collections import deque
 from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import closing
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from picchio.core.errors import InputError
-from picchio.core.files import atomic_write, locked, write_text
+from picchio.core.errors import InputError, OutputError
+from picchio.core.files import atomic_write, locked, write_text, writing
 from picchio.core.processes import one_thread
 from picchio.core.provenance import provenance
 from picchio.core.spread import require_scheduler, spread
+from picchio.core.unfinished import remove, unfinished
 from picchio.excitation.excitation import Excitation
 from picchio.excitation.piecewise import check_hits
 from picchio.model.model import Model
@@ -150,10 +150,11 @@ def workspace_map(
         chunk = min(most, max(SMALL_CHUNK, _HITS // (hits or 1)))
     if scheduler is not None:
         require_scheduler(scheduler)
-    with locked(target):
+    with locked(target), ExitStack() as opened:
         if restart:
-            shutil.rmtree(_folder_of(target), ignore_errors=True)
-        folder = _open_folder(target, job, chunk)
+            remove(_folder_of(target))
+        folder = opened.enter_context(unfinished(lambda: _folder(target), _tidied))
+        _label(folder, job, chunk)
         spans = [(k, min(k + chunk, len(places))) for k in range(0, len(places), chunk)]
         missing = [span for span in spans if not _file(folder, span).exists()]
         tell = progress or (lambda done, total: None)
@@ -175,8 +176,12 @@ def workspace_map(
                         tell(done, len(places))
                     yield fresh.pop(span, None) or _read(_file(folder, span))
 
-        join_chunks(target, finished(), _attributes(job))
-        shutil.rmtree(folder)
+        try:
+            join_chunks(target, finished(), _attributes(job))
+        except OutputError:  # a full disk wants room, not the chunks
+            remove(folder)
+            raise
+        remove(folder)
     return WorkspaceMap(open_map(target), target)
 
 
@@ -184,9 +189,23 @@ def _folder_of(target: Path) -> Path:
     return target.with_name(f".{target.name}.chunks")
 
 
-def _open_folder(target: Path, job: MapJob, chunk: int) -> Path:
-    """The folder of finished chunks; one that belongs to another map is not touched."""
+def _folder(target: Path) -> Path:
     folder = _folder_of(target)
+    with writing(target):
+        folder.mkdir(exist_ok=True)
+    return folder
+
+
+def _tidied(folder: Path) -> None:
+    """What an interrupted map leaves: whole chunks, from which it resumes, or nothing."""
+    for part in folder.glob(".*.part"):
+        remove(part)
+    if not any(folder.glob("*.npz")):
+        remove(folder)
+
+
+def _label(folder: Path, job: MapJob, chunk: int) -> None:
+    """Say whose chunks are in the folder; those of another map are not touched."""
     plan = _attributes(job) | {
         "robot": [hashlib.sha256(path.read_bytes()).hexdigest() for path in job.model.robot.files],
         "tool": job.model.robot.tool_frame,
@@ -204,10 +223,8 @@ def _open_folder(target: Path, job: MapJob, chunk: int) -> Path:
             file=folder,
             hint="--restart discards them; or write to another file",
         )
-    folder.mkdir(exist_ok=True)
     if not label.exists():
         write_text(label, text)
-    return folder
 
 
 def _file(folder: Path, span: tuple[int, int]) -> Path:

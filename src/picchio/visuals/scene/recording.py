@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from picchio.core.errors import InputError
 from picchio.core.files import swap_in, writing
+from picchio.core.unfinished import unfinished
 from picchio.visuals.kinematics import joint_motion
 from picchio.visuals.scene.robot.mesh import moved, rgb
 
@@ -39,14 +40,25 @@ def write_recording(scene: Scene, path: str | Path) -> Path:
     except ImportError:
         raise InputError("a Rerun recording needs rerun-sdk",
                          hint="pip install 'picchio[rerun]'") from None  # fmt: skip
-    motion, target = scene.motion, Path(path)
+    target = Path(path)
+    with unfinished(lambda: target.with_name(f".{target.name}.part")) as part:
+        stream = rr.RecordingStream(f"picchio {scene.title}", send_properties=False)
+        with writing(target):
+            stream.save(part)
+        _record(scene, stream)
+        with writing(target):
+            swap_in(part, target)
+    return target
+
+
+def _record(scene: Scene, stream: Any) -> None:
+    """All of the scene into an open recording, which is then closed."""
+    import rerun as rr
+
+    motion = scene.motion
     along = np.asarray(motion["directions"][0]["along"])
     samples = np.einsum("ndk,d->nk", np.asarray(motion["samples"]), along)
     when = rr.TimeColumn("time", duration=motion["step"] * np.arange(samples.shape[1]))
-    part = target.with_name(f".{target.name}.part")
-    stream = rr.RecordingStream(f"picchio {scene.title}", send_properties=False)
-    with writing(target):
-        stream.save(part)
     stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     for frame in scene.frames:
         if frame.axis is None or not frame.follows.any():
@@ -80,6 +92,3 @@ def write_recording(scene: Scene, path: str | Path) -> Path:
     stream.log("force_direction", arrow, static=True)
     stream.flush()
     stream.disconnect()
-    with writing(target):
-        swap_in(part, target)
-    return target

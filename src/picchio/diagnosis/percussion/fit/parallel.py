@@ -9,8 +9,8 @@ from functools import partial
 from typing import Any
 
 from picchio.core.arrays import FloatArray
+from picchio.core.workers import Worker, answered, worker_count
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Pin, Problem
-from picchio.diagnosis.workers import Worker, answered, worker_count
 from picchio.model.effects.effect import Effect
 
 # Numbers of a residual (channels x samples, all records) below which sending costs what it saves.

@@ -8,10 +8,10 @@ from functools import partial
 import numpy as np
 
 from picchio.core.arrays import FloatArray
+from picchio.core.workers import worker_count
 from picchio.diagnosis.attempt import attempt
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
-from picchio.diagnosis.workers import worker_count
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.registry import catalogue

@@ -8,7 +8,8 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from picchio.diagnosis.attempt import attempt
+from picchio.core.workers import worker_pool
+from picchio.diagnosis.attempt import attempt, trials
 from picchio.diagnosis.percussion.criteria.equivalence import SAME, bic
 from picchio.diagnosis.percussion.criteria.remainder import allowed
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem
@@ -17,7 +18,6 @@ from picchio.diagnosis.percussion.fit.least_squares import Fit, fit, fit_growing
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.search.screen import Screen, Suspect, resized
 from picchio.diagnosis.percussion.search.state import Search, Trial
-from picchio.diagnosis.workers import worker_pool
 from picchio.model.effects.effect import Effect
 
 # One candidate fitted: to the first part of the records, and from there to all of them.
@@ -145,7 +145,7 @@ def try_candidates(
     functions = {"screen": screen.suspect, "short": short_fit, "long": long_fit}
     if early is not None:
         functions["early"] = early.suspect
-    with worker_pool(problem.workers, functions) as mapped:
+    with worker_pool(problem.workers, trials(functions)) as mapped:
         suspects = screen.ranked(mapped("screen", candidates))
         logarithm = math.log(max(start.samples, 2))
         if whole:

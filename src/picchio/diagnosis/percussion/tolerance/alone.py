@@ -15,11 +15,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from picchio.core.arrays import FloatArray
+from picchio.core.workers import worker_pool
+from picchio.diagnosis.attempt import trials
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem, residual_under
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.tolerance.nudges import POSE, nudged
 from picchio.diagnosis.percussion.tolerance.slopes import own_slopes, starts
-from picchio.diagnosis.workers import worker_pool
 
 # Standard deviations of noise's mean square beyond which a record is left behind.
 _BEHIND = 6.0
@@ -91,7 +92,7 @@ def sought_alone(
 
     with (
         problem.pinned(here.effects),
-        worker_pool(problem.workers, {"numbers of a record": sought}) as mapped,
+        worker_pool(problem.workers, trials({"numbers of a record": sought})) as mapped,
     ):
         found = mapped("numbers of a record", [record.name for record in records])
     pairs = zip(records, found, strict=True)

@@ -11,7 +11,8 @@ from itertools import zip_longest
 import numpy as np
 
 from picchio.core.arrays import FloatArray
-from picchio.diagnosis.attempt import attempt
+from picchio.core.workers import shared_array, worker_pool
+from picchio.diagnosis.attempt import attempt, trials
 from picchio.diagnosis.percussion.data.problem import (
     MeasuredRecord,
     Problem,
@@ -20,7 +21,6 @@ from picchio.diagnosis.percussion.data.problem import (
 )
 from picchio.diagnosis.percussion.fit.least_squares import JUMP, between
 from picchio.diagnosis.percussion.tolerance.nudges import POSE, Inexact, Nudge, inexact, nudged
-from picchio.diagnosis.workers import shared_array, worker_pool
 from picchio.model.effects.effect import Effect
 from picchio.model.model import Model
 from picchio.prediction.percussion import BY_MODES
@@ -208,7 +208,10 @@ def all_slopes(
             room[record.name][:] = columns
         return [products(columns) for columns in found]
 
-    with problem.pinned(effects), worker_pool(problem.workers, {"slopes": at_pose}) as mapped:
+    with (
+        problem.pinned(effects),
+        worker_pool(problem.workers, trials({"slopes": at_pose})) as mapped,
+    ):
         found = mapped("slopes", poses)
     slopes = {}
     for records, grams in zip(poses.values(), found, strict=True):

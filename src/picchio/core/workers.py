@@ -9,19 +9,19 @@ import os
 import signal
 import sys
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from multiprocessing.connection import Connection, wait
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from picchio.core.processes import end_with
-from picchio.diagnosis.attempt import attempt
 
-_MOST = 8
+_MOST = 8  # processes of one pool, unless more are asked for: memory and pipes have their ends
 _ASKING = (signal.SIGINT, signal.SIGTERM)  # a process to end
+Done = TypeVar("Done")
 _within = False  # whether this is a process that was forked here
 
 
@@ -111,6 +111,8 @@ def _serve(
     other.close()
     # Whatever shows warnings may have been in the middle of something when this was forked.
     warnings.simplefilter("ignore")
+    if "numba" in sys.modules:
+        sys.modules["numba"].set_num_threads(1)  # each core has a process already
     while True:
         try:
             asked = connection.recv()
@@ -133,7 +135,7 @@ def worker_pool(
     on Linux, or within such a process), or one core is all there is, this one does the work itself;
     so it does with what is left where one is killed.
 
-    A function that fails gives None, see `attempt`.
+    An error of a function is raised here.
 
     Args:
         workers: processes; as many as cores where None, eight at most.
@@ -147,7 +149,7 @@ def worker_pool(
 
     def run(asked: tuple[str, Any]) -> Any:
         name, item = asked
-        return attempt(name, partial(functions[name], item))
+        return functions[name](item)
 
     def mapped(name: str, items: Iterable[Any]) -> list[Any]:
         nonlocal alone
@@ -156,10 +158,10 @@ def worker_pool(
             return [run(asked) for asked in todo]
         while len(pool) < worker_count(workers):
             pool.append(Worker(run))
-        told = _shared_out(todo, pool)
+        told = dict(_shared_out(todo, pool))
         # Who is killed is not replaced: memory may be what was lacking.
         alone = len(told) < len(todo)
-        return [told[k] if k in told else run(asked) for k, asked in enumerate(todo)]
+        return [_given(told[k]) if k in told else run(asked) for k, asked in enumerate(todo)]
 
     try:
         yield mapped
@@ -168,12 +170,44 @@ def worker_pool(
             worker.end()
 
 
-def _shared_out(todo: list[Any], pool: list[Worker]) -> dict[int, Any]:
-    """What is answered to each, by its place; whoever is free is sent the next.
+def as_done(
+    function: Callable[[Any], Done], items: Sequence[Any], workers: int | None
+) -> Iterator[Done]:
+    """What a function makes of each item, as soon as it is there; as of `worker_pool`.
+
+    Args:
+        function: of one item; its error is raised here.
+        items: any number.
+        workers: processes; as many as cores where None, eight at most.
+
+    Returns:
+        an iterator of results, in any order.
+    """
+    count = min(worker_count(workers), len(items))
+    pool = [Worker(function) for _ in range(count)] if count > 1 else []
+    left = set(range(len(items)))
+    try:
+        for place, answer in _shared_out(items, pool):
+            left.discard(place)
+            yield _given(answer)
+    finally:
+        for worker in pool:
+            worker.end()
+    for place in sorted(left):
+        yield function(items[place])
+
+
+def _given(answer: Any) -> Any:
+    if isinstance(answer, Exception):
+        raise answer
+    return answer
+
+
+def _shared_out(todo: Sequence[Any], pool: list[Worker]) -> Iterator[tuple[int, Any]]:
+    """The place of each and what is answered to it; whoever is free is sent the next.
 
     Not all are answered where a worker is killed.
     """
-    told: dict[int, Any] = {}
     at: dict[Any, int] = {}  # which each connection was sent
     left = iter(range(len(todo)))
 
@@ -190,7 +224,10 @@ def _shared_out(todo: list[Any], pool: list[Worker]) -> dict[int, Any]:
         ready: list[Any] = wait(list(at))
         for connection in ready:
             place = at.pop(connection)
-            with suppress(EOFError, OSError):
-                told[place] = connection.recv()
+            try:
+                answer = connection.recv()
+            except (EOFError, OSError):
+                continue
+            with suppress(OSError):
                 send(connection)
-    return told
+            yield place, answer
