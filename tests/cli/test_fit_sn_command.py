@@ -51,8 +51,8 @@ def test_real_tests_print_a_table(picchio, measured_data):
 @pytest.mark.parametrize(
     ("text", "part"),
     [
-        ("", "no tests"),
-        ("Stress [MPa],Cycles\n300,x\n", "row"),
+        ("", "is empty"),
+        ("Stress [MPa],Cycles\n300,x\n", "line 2"),
         ("Load [kgf],Cycles\n300,10\n", "kgf"),
         ("a,b\n1,2\n", "stress"),
     ],
@@ -65,6 +65,20 @@ def test_bad_tables(picchio, tmp_path, text, part):
     assert done.stdout == ""
     assert len(done.stderr.splitlines()) == 1
     assert part in done.stderr.lower()
+
+
+def test_the_options_that_say_what_a_column_is(picchio, tests_file):
+    """The same tests as maxima from zero, with a column of outcomes that has no usual name."""
+    lines = tests_file.read_text().replace("Comment", "Verdict").splitlines()
+    rows = [f"{2 * float(x)},{y}" for x, _, y in (line.partition(",") for line in lines[1:])]
+    tests_file.write_text("\n".join([lines[0], *rows]))
+    options = ["--stress", "max", "--ratio", "0", "--outcome", "Verdict", "--cycles", "Cycles",
+               "--stress-column", "Stress [MPa]", "--stress-unit", "MPa"]  # fmt: skip
+    done = picchio("fit-sn", tests_file, *options, "--json", "-")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found["endurance_limit"]["value"] == pytest.approx(300e6, rel=0.05)
+    assert any("max (1 - R) / 2, of Stress [MPa]" in note for note in found["assumptions"])
 
 
 def test_a_picture_of_real_tests(picchio, measured_data, tmp_path):

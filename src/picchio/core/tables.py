@@ -395,7 +395,7 @@ class _Sample:
         # Prose or comments may stand above: the numbers say what the rest is.
         full = [cells for _, cells in self.rows if len(cells) == self.width][-_LINES:]
         shares = [sum(map(known, column)) for column in zip(*full, strict=True)]
-        usual = [2 * n > sum(not _NOTHING.fullmatch(c) for c in column) and n > 0
+        usual = [2 * n >= sum(not _NOTHING.fullmatch(c) for c in column) and n > 0
                  for n, column in zip(shares, zip(*full, strict=True), strict=True)]  # fmt: skip
         if not any(usual):
             return None

@@ -23,7 +23,8 @@ def fit_sn(
         Path,
         typer.Argument(
             metavar="TESTS.csv",
-            help="A row a specimen: `Stress [MPa]`, `Cycles`, `Comment` (Failure or RunOut).",
+            help="A row a specimen: `Stress amplitude [MPa]` (or range, max and R), `Cycles`, "
+            "`Failure` (yes or no) or `Outcome` (Failure or RunOut).",
         ),
     ],
     survival: Annotated[
@@ -41,8 +42,32 @@ def fit_sn(
     run_out_cycles: Annotated[
         float | None,
         typer.Option(
-            metavar="N", help="Without a `Comment` column: specimens that reached N are run-outs."
+            metavar="N", help="Without an outcome column: specimens that reached N are run-outs."
         ),
+    ] = None,
+    stress: Annotated[
+        str | None,
+        typer.Option(
+            metavar="KIND", help="What the column of stresses holds: amplitude, range or max."
+        ),
+    ] = None,
+    stress_column: Annotated[
+        str | None, typer.Option(metavar="COLUMN", help="The column of stresses, by its name.")
+    ] = None,
+    stress_unit: Annotated[
+        str | None,
+        typer.Option(metavar="UNIT", help="Of the stresses, where their name has none: MPa, ksi."),
+    ] = None,
+    ratio: Annotated[
+        float | None,
+        typer.Option(metavar="R", help="Least over largest stress, where no column says."),
+    ] = None,
+    cycles: Annotated[
+        str | None, typer.Option(metavar="COLUMN", help="The column of cycles, by its name.")
+    ] = None,
+    outcome: Annotated[
+        str | None,
+        typer.Option(metavar="COLUMN", help="The column that says which specimens failed."),
     ] = None,
     out: Annotated[
         Path | None,
@@ -62,8 +87,10 @@ def fit_sn(
     check_targets((out, plot, json), [tests])
     with telling("fitting"):
         found = picchio.fit_sn(
-            tests, kind=kind, survival=survival, level=level, run_out_cycles=run_out_cycles
-        )
+            tests, kind=kind, survival=survival, level=level, run_out_cycles=run_out_cycles,
+            stress=stress, stress_column=stress_column, stress_unit=stress_unit, ratio=ratio,
+            cycles=cycles, outcome=outcome,
+        )  # fmt: skip
     if plot is not None:
         from picchio.visuals.plots.sn import plot_sn_fit
         from picchio.visuals.plots.style import blank_figure, save_figure

@@ -193,6 +193,7 @@ def fit_sn(
     survival: float = 0.975,
     knee: bool | None = None,
     run_out_cycles: float | None = None,
+    **columns: Any,
 ) -> SNFit:
     """Fit slope, knee, endurance limit and scatter to fatigue tests, by maximum likelihood.
 
@@ -222,6 +223,8 @@ def fit_sn(
         knee: True: fit a knee. False: a straight line, run-outs censored. None: a knee where the
             tests have run-outs.
         run_out_cycles: in a table without outcomes, tests that reached this are run-outs.
+        columns: of a table, what its columns are, as `read_sn_tests` takes it: `stress`,
+            `stress_column`, `stress_unit` (Pa where it is SI), `ratio`, `cycles`, `outcome`.
 
     Returns:
         each value with its interval; `curve` makes an S-N curve of it.
@@ -244,7 +247,7 @@ def fit_sn(
         )
     given = tests
     if not isinstance(given, SNTests):
-        given = read_sn_tests(given, run_out_cycles=run_out_cycles)
+        given = read_sn_tests(given, run_out_cycles=run_out_cycles, **columns)
     factor, note = _TO_SHEAR[kind]
     given = dataclasses.replace(
         given,
