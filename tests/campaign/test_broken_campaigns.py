@@ -101,7 +101,14 @@ SAMPLES = {
     "no header": (lambda lines: lines[1:], ["channel [unit]", "column 1"]),
     "a header alone": (lambda lines: lines[:1], ["is empty"]),
     "one sample": (lambda lines: lines[:2], ["one sample"]),
-    "semicolons": (lambda lines: [x.replace(",", ";") for x in lines], ["commas"]),
+    "semicolons and a short row": (
+        lambda lines: [x.replace(",", ";") for x in line(40, lambda c: c[:-1])(lines)],
+        ["line 40", "4 cells"],
+    ),
+    "semicolons and a word": (
+        lambda lines: [x.replace(",", ";") for x in cell(40, 1, "high")(lines)],
+        ["line 40", "'high'"],
+    ),
     "no time": (header("time [s],", "velocity.tool.x [m/s],"), ["first column"]),
     "time not first": (
         lambda lines: [",".join(reversed(x.split(","))) for x in lines],
@@ -203,9 +210,9 @@ def test_broken_samples(campaign_folder, name):
 
 
 BYTES = {
-    "Latin-1 in the header": (lambda b: b.replace(b"[rad]", b"[\xb0]"), ["UTF-8"]),
+    "Latin-1 in the header": (lambda b: b.replace(b"[rad]", b"[\xb2]"), ["column 3", "'²'"]),
     "Latin-1 in a line": (lambda b: b[:-3] + b"\xff\n", ["line 101", "UTF-8"]),
-    "UTF-16": (lambda b: b.decode().encode("utf-16"), ["UTF-8"]),
+    "UTF-16, cut": (lambda b: b[:-30].decode().encode("utf-16"), ["line 101"]),
     "zeros": (lambda b: bytes(len(b)), ["no header"]),
     "zeros at the end": (lambda b: b + bytes(100), ["line 102"]),
     "a gzip": (lambda b: b"\x1f\x8b\x08\x00" + b, ["UTF-8"]),

@@ -42,6 +42,54 @@ def test_what_a_table_says(tmp_path):
     np.testing.assert_allclose(found.set, [1, 1])
 
 
+@pytest.mark.parametrize(
+    ("encoding", "sep", "decimal", "units"),
+    [
+        ("cp1252", ";", ",", False),
+        ("utf-16", "\t", ",", False),
+        ("utf-8-sig", ";", ".", False),
+        ("cp1252", ",", ".", False),
+        ("utf-8", ";", ",", True),
+    ],
+)
+def test_a_table_from_a_spreadsheet(tmp_path, encoding, sep, decimal, units):
+    """The same loadings in other letters, separators, signs, and with a line of units."""
+    table = {name.replace("deg", "°"): cells for name, cells in TABLE.items()}
+    plain = loadings(write(tmp_path, table))
+    lines = [list(table), *(list(map(str, row)) for row in zip(*table.values(), strict=True))]
+    if units:
+        parts = [name.rstrip("]").partition(" [") for name in lines[0]]
+        lines[:1] = [[part[0] for part in parts], [part[2] for part in parts]]
+    body = [[cell.replace(".", decimal) if k > units else cell for cell in line]
+            for k, line in enumerate(lines)]  # fmt: skip
+    text = "\r\n".join(sep.join(line) for line in body) + "\r\n"
+    (tmp_path / "loads.csv").write_text(text, encoding=encoding, newline="")
+    found = loadings(tmp_path)
+    for name, values in plain.pose.items():
+        np.testing.assert_array_equal(found.pose[name], values)
+    np.testing.assert_array_equal(found.force, plain.force)
+    np.testing.assert_array_equal(found.readings[0].values, plain.readings[0].values)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("pose.joint_1 [deg];weight [N];dial [mm]\n1,5;100;\n2,5;90;0,1\n", "dial.*line 2"),
+        (
+            "pose.joint_1 [deg];weight [N];dial [mm]\n1,5;100;0,2\n2,5;90;0,1\n3;9\n4;8;1\n",
+            "line 4.*3 c",
+        ),
+        ("pose.joint_1 [Grad];weight [N];dial [mm]\n1,5;100;0,2\n", "pose.joint_1.*'Grad'.*deg"),
+        ("1;100;2\n2;90;1\n", "name the columns"),
+    ],
+)
+def test_a_table_from_a_spreadsheet_that_is_refused(tmp_path, text, words):
+    write(tmp_path)
+    (tmp_path / "loads.csv").write_text(text)
+    with pytest.raises(picchio.InputError, match=words):
+        loadings(tmp_path)
+
+
 def test_displacements_weights_points_and_deflections(tmp_path):
     table = {
         "pose.joint_2 [rad]": [0.5], "weight [N]": [50.0], "point.z [m]": [0.1],

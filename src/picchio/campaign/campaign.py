@@ -11,7 +11,7 @@ from typing import Any
 
 from picchio.campaign.channels import parse_channel
 from picchio.campaign.clock import TOLERANCE
-from picchio.campaign.csv_source import CsvSource, write_csv
+from picchio.campaign.csv_source import text_source, write_csv
 from picchio.campaign.parquet_source import ParquetSource, write_parquet
 from picchio.campaign.record import LAYOUTS, Record
 from picchio.campaign.source import Source
@@ -308,7 +308,7 @@ def _open(folder: Path, entry: RecordTable, index: int) -> Source:
         raise InputError("is outside the campaign's folder", file=path, key=f"{key}.file")
     if path.suffix in UFF_SUFFIXES and entry.kind == "frf":
         return frf_source(path, key, LAYOUTS["frf"], entry)
-    kind = ParquetSource if path.suffix == ".parquet" else CsvSource
+    kind = ParquetSource if path.suffix == ".parquet" else text_source
     return kind(path, key, LAYOUTS.get(entry.kind))
 
 

@@ -266,6 +266,10 @@ def _unknown(name: str, among: Iterable[ChannelKind]) -> InputError:
         return InputError(f"a channel of this kind is named {' or '.join(alike)}", value=name)
     close = difflib.get_close_matches(name.partition(".")[0], [kind.name for kind in known], n=1)
     hint = f"did you mean {close[0]!r}?" if close else None
+    if any(_split(name, kind) for kind in (*LOADING_KINDS, *FRF_KINDS) if kind not in known):
+        hint = (
+            "it is a column of a static or frf record: name its table in a campaign.toml as it is"
+        )
     choices = [kind.pattern for kind in known]
     return InputError("unknown channel", value=name, choices=choices, hint=hint)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import codecs
+import contextlib
 import csv
 import re
 import warnings
@@ -12,12 +14,15 @@ from typing import BinaryIO
 import numpy as np
 
 from picchio.campaign.channels import Channel
-from picchio.campaign.source import Block, Column, FileSource, Samples
+from picchio.campaign.source import Block, Column, FileSource, Layout, Samples
 from picchio.core.arrays import FloatArray
-from picchio.core.errors import warn_user
+from picchio.core.errors import InputError, warn_user
+from picchio.core.files import regular_file
+from picchio.core.tables import sniffed, table_blocks
 
 _LONGEST_LINE = 1 << 20
 _BYTES_A_VALUE = 20
+_UTF16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.I)
 
 
@@ -48,9 +53,6 @@ class CsvSource(FileSource):
             raise self.error(f"is not UTF-8 text (byte {error.start})") from None
         if "\0" in text or len(line) == _LONGEST_LINE:
             raise self.error("is not a CSV file: its first line is no header")
-        if ";" in text and "," not in text:
-            raise self.error("columns must be separated by commas, not semicolons",
-                             hint="`picchio import` reads other tables")  # fmt: skip
         try:
             return next(csv.reader([text], strict=True))
         except csv.Error as error:
@@ -141,6 +143,61 @@ class CsvSource(FileSource):
             if not _NUMBER.fullmatch(cell.strip()):
                 raise self.error("is not a number", channel=name, sample=sample, value=cell)
         return [float(cell) for cell in cells]
+
+
+class TableSource(FileSource):
+    """A table as a spreadsheet writes it: semicolons, tabs, decimal commas, another encoding."""
+
+    row_word = "line"
+
+    def names(self) -> list[str]:
+        """As `FileSource`; a unit may stand in a line below the name."""
+        self.table_layout = sniffed(self.checked_path())[0]
+        table = next(table_blocks(self.path, self.table_layout))
+        self.series, self.first_row = list(table.columns), int(table.lines[:1].sum()) or 2
+        if not self.table_layout.header:
+            raise self.error("the first line must name the columns", value=self.series)
+        return [f"{c.name} [{c.unit}]" if c.unit else c.name for c in table.columns.values()]
+
+    def blocks(self, names: Sequence[str], size: int) -> Iterator[Block]:
+        """As `Source`; a line that is ragged or holds no number is refused by its number."""
+        columns, first = [self.columns[name] for name in names], 0
+        wanted = {self.series[column.index]: column for column in columns}
+        for table in table_blocks(self.path, self.table_layout, size, numbers=self.series):
+            for one in table.left:
+                if one.column is None or one.column in wanted:
+                    raise self.error(one.why, channel=one.column, value=one.text,
+                                     sample=one.line - self.first_row)  # fmt: skip
+            yield (
+                first,
+                {
+                    c.channel.name: np.ascontiguousarray(c.convert(table.columns[name].values))
+                    for name, c in wanted.items()
+                },
+            )
+            first += table.lines.size
+
+
+def text_source(path: Path, key: str, layout: Layout | None) -> FileSource:
+    """The samples of a file of text: in the format's own habit, or as a spreadsheet writes it.
+
+    Args:
+        path: the file.
+        key: the record's name in messages.
+        layout: what its columns may be.
+
+    Raises:
+        InputError: as of `FileSource`.
+    """
+    head = b","
+    with contextlib.suppress(InputError, OSError), open(regular_file(path), "rb") as stream:
+        head = stream.readline(_LONGEST_LINE)
+    plain = b"," in head or not (b";" in head or b"\t" in head)
+    with contextlib.suppress(UnicodeDecodeError):
+        head.decode("utf-8-sig")
+        return CsvSource(path, key, layout) if plain else TableSource(path, key, layout)
+    of_text = b"\0" not in head or head.startswith(_UTF16)
+    return TableSource(path, key, layout) if of_text else CsvSource(path, key, layout)
 
 
 def write_csv(path: Path, channels: Sequence[Channel], blocks: Iterable[Samples]) -> None:

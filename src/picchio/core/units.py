@@ -2,7 +2,8 @@
 
 pint does the parsing and the dimensions. It gets its own short list of units, because its default
 one takes an angle for a plain number (then `deflection [1]` or `[%]` would pass for radians, and
-hertz for rad/s) and `Nm` for something else than a newton metre.
+hertz for rad/s) and `Nm` for something else than a newton metre. Mega and giga are no prefixes
+of everything: Grad is German for degrees.
 """
 
 from __future__ import annotations
@@ -28,13 +29,12 @@ deci- = 1e-1 = d-
 deca- = 1e1 = da-
 hecto- = 1e2 = h-
 kilo- = 1e3 = k-
-mega- = 1e6 = M-
-giga- = 1e9 = G-
 second = [time] = s = sec = seconds = secs
 minute = 60 * second = min = minutes
 hour = 60 * minute = h = hours
 day = 24 * hour = d = days
 hertz = 1 / second = Hz
+megahertz = 1e6 * hertz = MHz
 metre = [length] = m = meter = metres = meters
 inch = 0.0254 * metre = in = inches
 foot = 0.3048 * metre = ft = feet
@@ -42,6 +42,7 @@ gram = [mass] = g = grams
 pound = 453.59237 * gram = lb = lbs = pounds
 ounce = pound / 16 = oz
 newton = kilogram * metre / second ** 2 = N = newtons
+meganewton = 1e6 * newton = MN
 pound_force = pound * g_n = lbf
 ounce_force = ounce * g_n = ozf
 gram_force = gram * g_n = gf
@@ -50,7 +51,8 @@ dyne = 1e-5 * newton = dyn
 newton_metre = newton * metre = Nm
 newton_second = newton * second = Ns
 pascal = newton / metre ** 2 = Pa
-megapascal = 1e6 * pascal = MPA = Mpa = mpa
+megapascal = 1e6 * pascal = MPa = MPA = Mpa = mpa
+gigapascal = 1e9 * pascal = GPa
 bar = 1e5 * pascal
 psi = pound_force / inch ** 2
 ksi = 1000 * psi = kpsi
@@ -66,6 +68,7 @@ kelvin = [temperature]; offset: 0 = K
 degree_Celsius = kelvin; offset: 273.15 = degC = degreeC = celsius
 degree_Fahrenheit = 5 / 9 * kelvin; offset: 255.37222222222223 = degF = degreeF = fahrenheit
 cycle = [cycle] = cycles
+megacycle = 1e6 * cycle = Mcycle = Mcycles = megacycles
 reversal = 0.5 * cycle = reversals
 """
 # Offered where a text is not understood, as far as they fit.
@@ -142,7 +145,9 @@ def _readings(text: str, anew: bool) -> list[str]:
     choices = []
     for symbol in symbols:
         known = _registry().parse_unit_name(symbol)[:1]
-        spelt = (symbol, symbol[0].swapcase() + symbol[1:])  # a prefix has its case, too
+        # A prefix has its case, too; but Mm may not pass for mm.
+        other_case = "" if symbol[0] == "M" and not symbol.isupper() else symbol[0].swapcase()
+        spelt = (symbol, (other_case or symbol[0]) + symbol[1:])
         other = [x for s in spelt for x in _registry().parse_unit_name(s, case_sensitive=False)]
         found = [x for x in other if not x[0]] if anew else known or other
         names = [(prefix, name) for prefix, name, _ in found]
