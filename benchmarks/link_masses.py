@@ -17,6 +17,7 @@ import picchio
 from picchio.robot.estimate import masses
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.loading.catalogue import shipped_robots
+from picchio.robot.urdf.shapes import link_ends
 from picchio.robot.urdf.tree import MOVABLE
 
 NAMES = ("AT_ONE_METRE", "GROWTH", "TAPER", "LEAST_LENGTH")
@@ -27,7 +28,7 @@ def arms() -> dict[str, tuple[np.ndarray, np.ndarray]]:
     found = {}
     for name in sorted(shipped_robots()):
         robot = picchio.load_robot(name, allow_rigid=True)
-        lengths = np.linalg.norm(masses.link_ends(robot), axis=1)
+        lengths = np.linalg.norm(link_ends(robot.tree, robot.tool_frame), axis=1)
         if lengths.sum() > 0.0:
             found[name] = lengths, own_masses(robot)
     return found

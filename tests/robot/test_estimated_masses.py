@@ -11,11 +11,12 @@ import picchio
 from picchio.core.arrays import symmetric
 from picchio.core.errors import InputError, PicchioWarning
 from picchio.robot.estimate import masses
-from picchio.robot.estimate.masses import estimated_masses, link_ends, weighted
+from picchio.robot.estimate.masses import estimated_masses, weighted
 from picchio.robot.estimate.rigid import left_rigid
 from picchio.robot.estimate.sidecar import estimated_sidecar
 from picchio.robot.loading.find import find_robot
 from picchio.robot.loading.load import load_robot
+from picchio.robot.urdf.shapes import link_ends
 
 
 @pytest.fixture
@@ -30,7 +31,7 @@ def bare(tmp_path):
 def test_an_arm_without_masses_is_as_heavy_as_such_arms_are(bare):
     with pytest.warns(PicchioWarning, match="nobody measured the masses, and the stiffness"):
         robot = load_robot(bare)
-    lengths = np.linalg.norm(link_ends(robot), axis=1)
+    lengths = np.linalg.norm(link_ends(robot.tree, robot.tool_frame), axis=1)
     carried = [body.mass for body in robot.tree.links.values() if body is not None]
     expected = masses.AT_ONE_METRE * lengths.sum() ** masses.GROWTH
     assert sum(carried) == pytest.approx(expected, rel=0.01)
@@ -61,9 +62,10 @@ def test_given_masses_are_never_estimated(bare):
 
 def test_rods_have_the_inertia_of_rods(bare):
     robot = load_robot(bare, allow_rigid=True)
-    end = link_ends(robot)[1]
+    ends = link_ends(robot.tree, robot.tool_frame)
     rod = estimated_masses(robot)["upper_arm_link"]
-    length, size = float(np.linalg.norm(end)), float(np.linalg.norm(link_ends(robot), axis=1).sum())
+    end = ends[1]
+    length, size = float(np.linalg.norm(end)), float(np.linalg.norm(ends, axis=1).sum())
     own = rod.mass * (masses._RADIUS * size) ** 2
     assert np.linalg.eigvalsh(symmetric(rod.inertia)).tolist() == pytest.approx(
         [own, own + rod.mass * length**2 / 12, own + rod.mass * length**2 / 12], rel=0.02

@@ -62,12 +62,11 @@ def _usual_frame(tree: UrdfTree, srdf: Srdf | None) -> tuple[str, str]:
             return name, f"the link is called {name!r}"
     if srdf is not None and len(set(srdf.end_effectors)) == 1:
         return srdf.end_effectors[0], f"{srdf.path.name}, end_effector"
-    movable = set(tree.movable())
+    movable = tree.movable()
     if not movable:
         return tree.root, "the root: nothing moves"
-    carried = [
-        link for link in tree.links if any(joint.name in movable for joint in tree.chain(link))
-    ]
+    beyond = {link for joint in movable for link in tree.beyond(joint)}
+    carried = [link for link in tree.links if link in beyond]
     for word in CONVENTION:
         named = [link for link in carried if _is_called(link, word)]
         if len({_place(tree, link) for link in named}) == 1:

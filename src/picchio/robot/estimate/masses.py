@@ -24,7 +24,7 @@ from picchio.robot.dynamics.rigid_model import RigidModel
 from picchio.robot.link import LinkEntry
 from picchio.robot.masses.check import WAYS_OUT, weighs
 from picchio.robot.urdf.normalised import normalise
-from picchio.robot.urdf.shapes import placement
+from picchio.robot.urdf.shapes import link_ends
 from picchio.robot.urdf.tree import MOVABLE, ZERO, Inertial
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def estimated_masses(robot: FlexibleRobot) -> dict[str, LinkEntry]:
     moving = [joint for joint in chain if joint.type in MOVABLE and joint.mimic is None]
     if not moving or any(weighs(robot, link) for link in tree.beyond(moving[0].name)):
         return {}
-    ends = link_ends(robot)
+    ends = link_ends(tree, robot.tool_frame)
     lengths = np.linalg.norm(ends, axis=1)
     size = float(lengths.sum())
     if not size > 0.0:
@@ -110,25 +110,6 @@ def masses(lengths: FloatArray) -> FloatArray:
     beyond = np.cumsum(lengths[::-1])[::-1] - 0.5 * lengths + LEAST_LENGTH * size
     part = (lengths + LEAST_LENGTH * size) * beyond**TAPER
     return np.asarray(AT_ONE_METRE * size**GROWTH * part / part.sum())
-
-
-def link_ends(robot: FlexibleRobot) -> FloatArray:
-    """(n, 3) m, where each link of the arm ends: the next joint, or the tool, in the link's frame.
-
-    Args:
-        robot: whose tool's chain it is.
-    """
-    ends: list[FloatArray] = []
-    matrix = None
-    for joint in robot.tree.chain(robot.tool_frame):
-        step = placement(joint.xyz, joint.rpy)
-        matrix = step if matrix is None else matrix @ step
-        if joint.type in MOVABLE and joint.mimic is None:
-            ends.append(matrix[:3, 3])
-            matrix = np.eye(4)
-    # Before the first joint stands the base.
-    last = np.zeros(3) if matrix is None else matrix[:3, 3]
-    return np.array([*ends[1:], last]).reshape(-1, 3)
 
 
 def _rod(mass: float, end: FloatArray, radius: float, source: str) -> LinkEntry:

@@ -65,14 +65,15 @@ def estimated_sidecar(
         why = f"the masses are estimates, to a factor of {SPREAD:g}"
         priors = priors.less_sure(SPREAD, why)
     kept = carrying(robot, [one.name for one in priors.joints])
+    wrong = next((f"{one}" for one in robot.findings if one.severity == "impossible"), "")
     if not kept:
-        raise InputError("no joint that moves the tool moves a mass", key="link",
+        raise InputError(wrong or "no joint that moves the tool moves a mass", key="link",
                          hint=WAYS_OUT)  # fmt: skip
     for one in priors.joints:
         if one.name in kept and not _POSSIBLE[0] < one.stiffness < _POSSIBLE[1]:
+            told = f"they would take a drive of {one.stiffness:.1g} N m/rad"
             raise InputError(
-                f"the masses beyond {one.name} cannot be: they would take a drive of "
-                f"{one.stiffness:.1g} N m/rad",
+                f"the masses beyond {one.name} cannot be: {wrong or told}",
                 key="link", hint=WAYS_OUT,
             )  # fmt: skip
     return as_sidecar(robot, priors, reducers, links, kept)

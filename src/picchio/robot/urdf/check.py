@@ -25,6 +25,8 @@ from picchio.robot.urdf.xml import local_name
 # Pinocchio's reader recurses link by link, and dense matrices grow with the square.
 MOST_LINKS = 2000
 MOST_MOVABLE = 300
+# kg m^2: CAD exports leave products of inertia of rounding size on a zero diagonal.
+LEAST_MOMENT = 1e-12
 
 
 def read_tree(root: etree._Element, path: Path) -> UrdfTree:
@@ -141,11 +143,10 @@ def bad_inertia(inertial: Inertial) -> str | None:
     """Why a body's inertia cannot be, or None if it can.
 
     A tensor must be positive semidefinite. The triangle inequality, which many published
-    URDFs break a little, is left alone.
+    URDFs break a little, is among a robot's findings.
     """
     principal = np.linalg.eigvalsh(symmetric(inertial.inertia))
-    # CAD exports leave products of inertia of rounding size on a zero diagonal.
-    if principal[0] < -1e-12 - 1e-9 * abs(principal).max():
+    if principal[0] < -LEAST_MOMENT - 1e-9 * abs(principal).max():
         moments = ", ".join(f"{value:.4g}" for value in principal)
         return f"its inertia is not positive semidefinite (principal moments {moments} kg m^2)"
     return None

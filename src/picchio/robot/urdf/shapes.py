@@ -15,7 +15,7 @@ from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.core.files import regular_file
 from picchio.robot.urdf.addresses import resolve_mesh
-from picchio.robot.urdf.tree import read_origin
+from picchio.robot.urdf.tree import MOVABLE, UrdfTree, read_origin
 from picchio.robot.urdf.xml import children
 
 _MOST_BYTES = 64 << 20
@@ -133,6 +133,26 @@ def placement(xyz: ArrayLike, rpy: ArrayLike) -> FloatArray:
     matrix[:3, :3] = pin.rpy.rpyToMatrix(np.asarray(rpy, dtype=float))
     matrix[:3, 3] = xyz
     return matrix
+
+
+def link_ends(tree: UrdfTree, tool: str) -> FloatArray:
+    """(n, 3) m, where each link of the arm ends: the next joint, or the tool, in the link's frame.
+
+    Args:
+        tree: of the robot.
+        tool: the frame whose chain of joints counts.
+    """
+    ends: list[FloatArray] = []
+    matrix = None
+    for joint in tree.chain(tool):
+        step = placement(joint.xyz, joint.rpy)
+        matrix = step if matrix is None else matrix @ step
+        if joint.type in MOVABLE and joint.mimic is None:
+            ends.append(matrix[:3, 3])
+            matrix = np.eye(4)
+    # Before the first joint stands the base.
+    last = np.zeros(3) if matrix is None else matrix[:3, 3]
+    return np.array([*ends[1:], last]).reshape(-1, 3)
 
 
 def origin(element: etree._Element) -> FloatArray:

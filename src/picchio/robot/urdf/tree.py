@@ -10,6 +10,7 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TypeVar, cast
 
@@ -17,7 +18,7 @@ import numpy as np
 import pinocchio as pin
 from lxml import etree
 
-from picchio.core.arrays import Vector
+from picchio.core.arrays import FloatArray, Vector, symmetric
 from picchio.core.errors import InputError
 from picchio.robot.units import JointUnits, units_of
 from picchio.robot.urdf.xml import EXPAND, children, local_name
@@ -54,6 +55,11 @@ class Inertial:
     xyz: Vector
     rpy: Vector
     inertia: tuple[float, ...]
+
+    @property
+    def tensor(self) -> FloatArray:
+        """The inertia as a matrix (3, 3)."""
+        return symmetric(self.inertia)
 
 
 @dataclass(frozen=True)
@@ -102,6 +108,19 @@ class UrdfTree:
     path: Path
     remarks: tuple[str, ...] = ()
 
+    @cached_property
+    def carriers(self) -> dict[str, UrdfJoint]:
+        """The joint that carries a link, by the link's name; the root has none."""
+        return {joint.child: joint for joint in self.joints.values()}
+
+    @cached_property
+    def carried(self) -> dict[str, list[UrdfJoint]]:
+        """The joints on a link, by the link's name."""
+        found: dict[str, list[UrdfJoint]] = {}
+        for joint in self.joints.values():
+            found.setdefault(joint.parent, []).append(joint)
+        return found
+
     def movable(self) -> list[str]:
         """The joints that can be flexible: revolute, continuous and prismatic, and no mimics."""
         return [j.name for j in self.joints.values() if j.type in MOVABLE and j.mimic is None]
@@ -112,8 +131,7 @@ class UrdfTree:
 
     def leaves(self) -> list[str]:
         """The links that carry no joint."""
-        parents = {joint.parent for joint in self.joints.values()}
-        return [name for name in self.links if name not in parents]
+        return [name for name in self.links if name not in self.carried]
 
     def link_of(self, frame: str) -> str | None:
         """The link whose frame this is, or None.
@@ -131,11 +149,10 @@ class UrdfTree:
         Args:
             link: its name.
         """
-        above = {joint.child: joint for joint in self.joints.values()}
         path = []
-        while link in above:
-            path.append(above[link])
-            link = above[link].parent
+        while link in self.carriers:
+            path.append(self.carriers[link])
+            link = path[-1].parent
         return path[::-1]
 
     def beyond(self, joint: str) -> list[str]:
@@ -144,12 +161,9 @@ class UrdfTree:
         Args:
             joint: its name.
         """
-        below: dict[str, list[str]] = {}
-        for other in self.joints.values():
-            below.setdefault(other.parent, []).append(other.child)
         found = [self.joints[joint].child]
         for link in found:
-            found.extend(below.get(link, ()))
+            found.extend(other.child for other in self.carried.get(link, ()))
         return found
 
 
