@@ -193,13 +193,13 @@ def test_the_noise_of_a_force_sensor_is_no_force():
 @pytest.mark.parametrize(
     ("text", "part"),
     [
-        ("", "header"),
-        ("time [s],force [kgf]\n0,1\n1,2\n", "force [N]"),
+        ("", "is empty"),
+        ("time [s],force [kg]\n0,1\n1,2\n", "force [kg]"),
         ("time [s],force [N]\n0,1\n", "two or more samples"),
         ("time [s],force [N]\n0,1\n1,x\n", "line 3"),
         ("time [s],force [N]\n0,1\n1,nan\n", "line 3"),
         ("time [s],force [N]\n0,1\n0,2\n", "does not ascend"),
-        ("time [s],force [N]\n0,1\n1\n", "line 3"),
+        ("time [s],force [N]\n0,1\n1,2\n2\n3,4\n", "line 4"),
     ],
 )
 def test_bad_measured_forces_are_refused(tmp_path, text, part):
@@ -209,6 +209,22 @@ def test_bad_measured_forces_are_refused(tmp_path, text, part):
         MeasuredForce.from_csv(path)
     assert part in str(caught.value)
     assert str(path) in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "encoding"),
+    [
+        ("time [ms],force [kN]\n0,0.001\n2.5,0.3\n5,0\n", "utf-8"),
+        ("force [N];time [µs]\n1,0;0\n300,0;2500\n0,0;5000\n", "cp1252"),
+        ("n\ttime [s]\tforce [kgf]\n1\t0\t0,101971621298\n2\t0,0025\t30,5914863893\n"
+         "3\t0,005\t0\n", "utf-16"),
+    ],
+)  # fmt: skip
+def test_a_measured_force_in_other_units_and_habits(tmp_path, text, encoding):
+    (tmp_path / "force.csv").write_text(text, encoding=encoding)
+    force = MeasuredForce.from_csv(tmp_path / "force.csv")
+    np.testing.assert_allclose(force.time, [0.0, 2.5e-3, 5e-3], rtol=1e-12)
+    np.testing.assert_allclose(force.samples, [1.0, 300.0, 0.0], rtol=1e-9)
 
 
 def test_a_period_shorter_than_the_record_is_refused():

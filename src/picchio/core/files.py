@@ -12,7 +12,7 @@ import shutil
 import stat
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -343,44 +343,3 @@ def csv_rows(
         where = f"line {first + reader.line_num - 1}"
         raise InputError(f"is no CSV: {error}", file=path, key=where) from None
     return rows
-
-
-def read_columns(
-    path: str | Path, needed: Sequence[str], optional: Sequence[str] = ()
-) -> list[list[float]]:
-    """Columns of numbers from a CSV file, found by their names in its header.
-
-    Args:
-        path: the file.
-        needed: names of columns.
-        optional: further ones, which are read where the header has all of them.
-
-    Returns:
-        a list a row, in the order of the names.
-
-    Raises:
-        InputError: no such file, a column that is missing or there twice, or a cell that is no
-            finite number, with its line.
-    """
-    rows = csv_rows(read_text(path).splitlines(), path)
-    header = [cell.strip() for cell in rows[0]] if rows else []
-    names = [*needed, *(optional if set(optional) <= set(header) else ())]
-    for name in names:
-        if header.count(name) != 1:
-            raise InputError(f"the header must name one column {name!r}", file=path, value=header)
-    found = []
-    for line, row in enumerate(rows[1:], start=2):
-        if not row:
-            continue
-        try:
-            numbers = [float(row[header.index(name)]) for name in names]
-        except (ValueError, IndexError):
-            numbers = [math.nan]
-        if not all(map(math.isfinite, numbers)):
-            raise InputError(
-                f"line {line} does not hold {len(names)} finite numbers",
-                file=path,
-                value=",".join(row),
-            )
-        found.append(numbers)
-    return found

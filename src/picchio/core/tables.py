@@ -22,11 +22,12 @@ from typing import IO, Annotated, Any, Literal
 import numpy as np
 from pydantic import AfterValidator, Field
 
-from picchio.core.arrays import IndexArray
+from picchio.core.arrays import FloatArray, IndexArray
 from picchio.core.dates import MISSING, is_moment, moments
 from picchio.core.errors import InputError
 from picchio.core.files import regular_file
 from picchio.core.toml import StrictModel
+from picchio.core.units import Conversion, conversion
 
 BLOCK = 1 << 17
 """Rows that are parsed at a time."""
@@ -214,6 +215,54 @@ def read_table(
     if not parts:
         raise InputError("is empty", file=path)
     return joined(parts)
+
+
+def read_columns(
+    path: str | Path, needed: Sequence[str], optional: Sequence[str] = ()
+) -> list[list[float]]:
+    """Columns of numbers in SI, found by their names in the header.
+
+    Args:
+        path: the file.
+        needed: names of columns with their SI units, such as "time [s]"; the file may have others.
+        optional: further ones, which are read where the header has all of them.
+
+    Returns:
+        a list a row, in the order of the names.
+
+    Raises:
+        InputError: no such file, a column that is missing or there twice, a unit of something else,
+            or a cell that is no finite number, with its line.
+    """
+    table = read_table(path)
+    there = [(*_name_and_unit(re.sub(r"#\d+$", "", name)), name) for name in table.columns]
+    wanted = [_name_and_unit(name) for name in (*needed, *optional)]
+    if not {name for name, _ in wanted[len(needed) :]} <= {name for name, _, _ in there}:
+        wanted = wanted[: len(needed)]
+    found: dict[str, FloatArray] = {}
+    for name, si in wanted:
+        same = [one for one in there if one[0] == name and (one[1] is None) == (si is None)]
+        if len(same) != 1:
+            shown = name if si is None else f"{name} [{si}]"
+            raise InputError(f"the header must name one column {shown!r}", file=path,
+                             value=list(table.columns))  # fmt: skip
+        column = table.columns[same[0][2]]
+        try:
+            scale = conversion(same[0][1] or "", (si,))[1] if si is not None else Conversion()
+        except InputError as error:
+            raise error.placed(file=path, key=column.name) from None
+        bad = [one for one in table.left if one.column in (None, column.name)]
+        if bad or column.kind != "number":
+            line, text = (bad[0].line, bad[0].text) if bad else (table.lines[0], column.values[0])
+            raise InputError(f"line {line} does not hold {len(wanted)} finite numbers", file=path,
+                             value=text)  # fmt: skip
+        found[column.name] = scale(column.values)
+    return np.column_stack(list(found.values())).tolist()
+
+
+def _name_and_unit(header: str) -> tuple[str, str | None]:
+    name, bracket, rest = header.partition("[")
+    return name.strip(), rest.rstrip("] ") if bracket else None
 
 
 def joined(parts: Sequence[Table]) -> Table:

@@ -10,7 +10,7 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
-from picchio.core.files import read_columns
+from picchio.core.tables import read_columns
 from picchio.excitation.excitation import Excitation
 from picchio.excitation.piecewise import PiecewiseForce
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from picchio.core.arrays import FloatArray, IndexArray
 from picchio.core.errors import InputError
-from picchio.core.files import read_columns
+from picchio.core.tables import read_columns
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.urdf.shapes import load_parts
 
