@@ -7,6 +7,7 @@ import json
 import tomllib
 import urllib.error
 import urllib.request
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -203,6 +204,7 @@ def test_the_server_answers_its_own_page_alone(tmp_path: Path) -> None:
     try:
         assert live.url.startswith("http://127.0.0.1:") and live.url in live._repr_html_()
         page = urllib.request.urlopen(live.url)
+        assert page.headers["X-Content-Type-Options"] == "nosniff"
         assert "default-src 'none'" in page.headers["Content-Security-Policy"]
         assert b"fanuc_like_3dof" in page.read()
         port = live.url.split("/")[2]
@@ -242,3 +244,99 @@ def test_the_server_answers_its_own_page_alone(tmp_path: Path) -> None:
     finally:
         live.close()
     assert not live.alive
+
+
+WRONG = {
+    "no object": "5",
+    "no JSON": "no json",
+    "no text": b"\xff\xfe",
+    "joints that are none": '{"id": 7, "joints": 5}',
+    "blows that are none": '{"id": 7, "blows": null}',
+    "a number of 5000 digits": '{"id": 7, "joints": {"0": ' + "9" * 5000 + "}}",
+    "a number beyond all floats": '{"id": 7, "joints": {"0": ' + "9" * 400 + "}}",
+    "an id of 5000 digits": '{"id": ' + "9" * 5000 + "}",
+    "deep": "[" * 50_000,
+    "deep in a key": '{"joints":' * 900 + "1" + "}" * 900,
+    "not a number": '{"id": 7, "tool": [NaN, 0, 0]}',
+    "infinite": '{"id": 7, "tool": [1e999, 0, 0]}',
+    "text for a number": '{"id": 7, "tool": ["1", 0, 0]}',
+    "two numbers": '{"id": 7, "direction": [1, 0]}',
+    "no direction": '{"id": 7, "direction": [0, 0, 0]}',
+    "no such joint": '{"id": 7, "joints": {"99": 0.1}}',
+    "a joint below none": '{"id": 7, "joint": -1}',
+    "a key that is none": '{"id": 7, "speed": 3}',
+    "no blows a second": '{"id": 7, "blows": {"rate": 0}}',
+    "too many hits": '{"id": 7, "blows": {"hits": 100000}}',
+}
+
+
+def test_every_message_is_answered_and_the_session_lives(tmp_path: Path) -> None:
+    from tornado.httpclient import HTTPRequest
+    from tornado.websocket import websocket_connect
+
+    live = picchio.explore("fanuc_like_3dof", save=tmp_path / "kept.toml")
+
+    async def talk() -> dict[str, tuple[str, float]]:
+        origin = live.url.rsplit("/", 2)[0]
+        address = live.url.replace("http", "ws") + "live"
+        socket = await websocket_connect(HTTPRequest(address, headers={"Origin": origin}))
+
+        async def answer(**wanted: Any) -> dict[str, Any]:
+            while True:
+                text = await asyncio.wait_for(socket.read_message(), 20)
+                told = json.loads(str(text)).get("values", {})
+                if (
+                    (told.get("problem") is not None)
+                    if not wanted
+                    else (told.get("answers") == wanted["id"])
+                ):
+                    return told
+
+        heard = {}
+        for k, (name, message) in enumerate(WRONG.items(), start=100):
+            await socket.write_message(message, binary=isinstance(message, bytes))
+            problem = (await answer())["problem"]
+            await socket.write_message(json.dumps({"id": k, "joints": {"0": 0.001 * k}}))
+            heard[name] = problem, (await answer(id=k))["pose"][0] - 0.001 * k
+        socket.close()
+        return heard
+
+    try:
+        heard = asyncio.run(talk())
+    finally:
+        live.close()
+    for name, (problem, off) in heard.items():
+        assert len(problem) < 400 and "\n" not in problem and "Error(" not in problem, name
+        assert abs(off) < 1e-12, name
+
+
+@pytest.mark.parametrize(
+    "origin", [None, "", "null", "https://{host}", "ftp://{host}", "http://{host}/", "{host}",
+               "http://localhost:{port}", "http://evil.example", "http://{host}.evil.example"],
+)  # fmt: skip
+def test_no_other_page_opens_the_socket(live_page: str, origin: str | None) -> None:
+    import http.client
+
+    host = live_page.split("/")[2]
+    sent = {"Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Version": "13",
+            "Sec-WebSocket-Key": "x3JJHMbDL1EzLkh9GBhXDw=="}  # fmt: skip
+    if origin is not None:
+        sent["Origin"] = origin.format(host=host, port=host.split(":")[1])
+    connection = http.client.HTTPConnection(host, timeout=10)
+    connection.request("GET", "/" + live_page.split("/")[3] + "/live", headers=sent)
+    assert connection.getresponse().status == 403
+    connection.close()
+
+
+@pytest.fixture(scope="module")
+def live_page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    live = picchio.explore("fanuc_like_3dof", save=tmp_path_factory.mktemp("x") / "x.toml")
+    page = urllib.request.urlopen(live.url)
+    assert page.headers["X-Frame-Options"] == "DENY"
+    assert "frame-ancestors 'none'" in page.headers["Content-Security-Policy"]
+    yield live.url
+    live._repr_html_()
+    page = urllib.request.urlopen(live.url)
+    assert page.headers["X-Frame-Options"] is None
+    assert "frame-ancestors http://127.0.0.1:*" in page.headers["Content-Security-Policy"]
+    live.close()

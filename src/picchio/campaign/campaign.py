@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
@@ -28,6 +29,7 @@ from picchio.campaign.tables import (
 from picchio.campaign.uff import ORDINATE, frf_source
 from picchio.core.errors import InputError, warn_user
 from picchio.core.files import part_of, recover, relative_name, swap_in, writing
+from picchio.core.guard import guard
 from picchio.core.toml import parse_toml, validate
 from picchio.core.unfinished import unfinished
 
@@ -183,7 +185,8 @@ class Campaign:
         Args:
             folder: where to; its parent must exist.
             suffix: ".csv" or ".parquet" for every record; None keeps each record's own.
-            overwrite: replace a campaign that stands there; any other folder is never replaced.
+            overwrite: replace a campaign that stands there, but for what else lies in its folder;
+                any other folder is never replaced.
             extra_files: further files by name, such as {"mapping.toml": b"..."}.
 
         Returns:
@@ -200,6 +203,7 @@ class Campaign:
         with writing(target), unfinished(partial(part_of, target, folder=True)) as temporary:
             _fill(self, temporary, target, suffix, extra_files or {})
             load_campaign(temporary)
+            _keep_others(target, temporary)
             swap_in(temporary, target)
         return load_campaign(target)
 
@@ -299,6 +303,7 @@ def load_campaign(path: str | Path | Campaign, *, clock_tolerance: float = TOLER
     )
     campaign = Campaign(table, records, folder)
     campaign._check()
+    guard.reading(campaign.files)
     return campaign
 
 
@@ -349,6 +354,19 @@ def _fill(campaign: Campaign, folder: Path, target: Path, suffix: str | None,
         write = write_parquet if path.suffix == ".parquet" else write_csv
         write(path, channels, record.chunks())
     (folder / CAMPAIGN_FILE).write_text(_toml(campaign, names, target), encoding="utf-8")
+
+
+def _keep_others(target: Path, folder: Path) -> None:
+    """What else lies in the folder of a campaign that is replaced stays there."""
+    if not (target / CAMPAIGN_FILE).is_file():
+        return
+    own = {CAMPAIGN_FILE, *(entry.file for entry in load_campaign(target).table.record)}
+    for path in target.rglob("*"):
+        name = path.relative_to(target)
+        if name.as_posix() in own or path.is_dir() or (folder / name).exists():
+            continue
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(path, folder / name, follow_symlinks=False)
 
 
 def _other_files(campaign: Campaign) -> dict[str, bytes]:

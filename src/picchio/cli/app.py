@@ -2,11 +2,39 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
-app = typer.Typer(
+from picchio.core.guard import guard
+
+
+class _Command(TyperCommand):
+    """A subcommand: its outputs are compared with what it is told to read, before any work."""
+
+    def make_context(self, *arguments: Any, **options: Any) -> Any:
+        guard.begin()
+        return super().make_context(*arguments, **options)
+
+    def invoke(self, context: Any) -> Any:
+        for param in self.params:
+            given = context.params.get(param.name)
+            if given and not guard.keys.intersection(param.opts):
+                every = given if isinstance(given, (list, tuple)) else [given]
+                named = str if param.param_type_name == "argument" else Path
+                guard.reading(each for each in every if isinstance(each, (named, Path)))
+        guard.check()
+        return super().invoke(context)
+
+
+class _App(typer.Typer):
+    def command(self, name: str | None = None, **options: Any) -> Any:
+        return super().command(name, **{"cls": _Command} | options)
+
+
+app = _App(
     name="picchio",
     add_completion=True,
     rich_markup_mode=None,  # boxes leave no room for words in 80 columns

@@ -3,11 +3,52 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
+from picchio.cli.output import folder_to_write, to_write
 from picchio.core.errors import InputError
+
+
+def output(key: str, metavar: str, help: str, *endings: str, **how: bool) -> Any:
+    """An option that names a file to write; it is refused before any work where it cannot be.
+
+    Args:
+        key: such as "--out".
+        metavar: of its value.
+        help: of the option.
+        *endings: of the file's name, where they are not all right.
+        **how: see `picchio.core.guard.Guard.declare`.
+    """
+
+    def named(text: str) -> Path:
+        return to_write(text, key, endings, **how)
+
+    return typer.Option(key, metavar=metavar, help=help, parser=named)
+
+
+def folder(key: str, metavar: str, help: str) -> Any:
+    """An option that names the folder of a campaign to write.
+
+    Args:
+        key: such as "--to".
+        metavar: of its value.
+        help: of the option.
+    """
+
+    def named(text: str) -> Path:
+        return folder_to_write(text, key)
+
+    return typer.Option(key, metavar=metavar, help=help, parser=named)
+
+
+def _json(text: str) -> str:
+    return text if text == "-" else str(to_write(text, "--json"))
+
+
+PAGES = (".html", ".htm")
+PICTURES = (".png", ".svg", ".pdf")
 
 RobotArgument = Annotated[
     str,
@@ -87,10 +128,11 @@ DataOption = Annotated[
     Path, typer.Option(metavar="CAMPAIGN", help="Measured data: a folder with a campaign.toml.")
 ]
 ReportOption = Annotated[
-    Path | None, typer.Option(metavar="OUT.html", help="Write one HTML page to read and print.")
+    Path | None, output("--report", "OUT.html", "Write one HTML page to read and print.", *PAGES)
 ]
 JsonOption = Annotated[
-    str | None, typer.Option(metavar="FILE", help="Write the result as JSON; - for stdout.")
+    str | None,
+    typer.Option(metavar="FILE", help="Write the result as JSON; - for stdout.", parser=_json),
 ]
 GravityStiffnessOption = Annotated[
     bool,

@@ -18,6 +18,7 @@ from picchio.cli.layout import FittedTable, Row
 from picchio.cli.waiting import waiting
 from picchio.core.errors import InputError, OutputError, PicchioWarning
 from picchio.core.files import atomic_write, is_stream
+from picchio.core.guard import guard
 from picchio.core.results import json_pieces
 
 if TYPE_CHECKING:
@@ -156,42 +157,50 @@ def count_of(count: float, noun: str) -> str:
     return f"{count:g} {noun}{'' if count == 1 else 's'}"
 
 
-def check_targets(
-    targets: Iterable[str | Path | None],
-    inputs: Iterable[str | Path | None],
-    folder: Path | None = None,
-) -> None:
-    """Refuse, before any work, outputs that cannot be written or would destroy an input.
+def to_write(text: str | Path, key: str, endings: Sequence[str] = (), **how: bool) -> Path:
+    """A file that is to be written, refused before any work where it cannot be.
 
-    What has been written of them is told at the end, by `say_written`.
+    What has been written is told at the end, by `say_written`.
 
     Args:
-        targets: where results shall go; None or "-" for nowhere.
-        inputs: files that the command reads.
-        folder: a campaign to write; it is checked where it is written.
+        text: its name as typed.
+        key: the option.
+        endings: of a name, where they are not all right.
+        **how: see `Guard.declare`.
 
     Raises:
-        InputError: the folder is missing, or the file is one of the inputs.
+        InputError: another ending, the folder is missing, or another option writes it, too.
         OutputError: the folder is read-only.
     """
-    read = [Path(source) for source in inputs if source is not None and Path(source).exists()]
-    if folder is not None:
-        _awaited.setdefault(folder, _stamp(folder))
-    for target in targets:
-        if target is None or str(target) == "-":
-            continue
-        path = Path(target)
-        if is_stream(path):
-            continue
+    path = Path(text)
+    if str(path) == "-":
+        raise InputError("must be a file", key=key, value=str(path))
+    if not is_stream(path):
+        if endings and path.suffix.lower() not in endings:
+            raise InputError("this output has another ending", file=path, key=key,
+                             value=path.suffix, choices=endings)  # fmt: skip
         if path.is_dir() and path.suffix != ".zarr":
             raise InputError("is a folder, not a file to write", file=path)
         if not path.parent.is_dir():
             raise InputError("cannot write here: the folder does not exist", file=path)
         if not os.access(path.parent, os.W_OK):
             raise OutputError("cannot be written: the folder is read-only", file=path)
-        if path.exists() and any(path.samefile(source) for source in read):
-            raise InputError("would overwrite an input of this command", file=path)
+        guard.declare(path, key, **how)
         _awaited.setdefault(path, _stamp(path))
+    return path
+
+
+def folder_to_write(text: str | Path, key: str) -> Path:
+    """A campaign's folder that is to be written; it is checked where it is written.
+
+    Args:
+        text: its name as typed.
+        key: the option.
+    """
+    path = Path(text)
+    guard.declare(path, key)
+    _awaited.setdefault(path, _stamp(path))
+    return path
 
 
 def _stamp(path: Path) -> tuple[int, ...] | None:
@@ -262,6 +271,7 @@ def progress(description: str) -> Iterator[Callable[[int, int], None]]:
     Yields:
         a function to call with (done, total).
     """
+    guard.check()
     yield lambda done, total: waiting.say(description, done, total)
     waiting.say(_AFTER)
 
@@ -276,6 +286,7 @@ def telling(what: str) -> Iterator[Callable[[str], None]]:
     Yields:
         a function to call with what is done now.
     """
+    guard.check()
     waiting.say(what)
     yield waiting.say
     waiting.say(_AFTER)

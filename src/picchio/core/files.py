@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from picchio.core.errors import InputError, OutputError
+from picchio.core.guard import guard
 from picchio.core.unfinished import unfinished
 
 LARGEST = 32 << 20
@@ -93,7 +94,9 @@ def writing(path: str | Path) -> Iterator[None]:
 
     Raises:
         OutputError: the disk is full or read-only, or the permission is missing.
+        InputError: a command would write over what it has read.
     """
+    guard.written(path)
     try:
         yield
     except BrokenPipeError:  # the reader has gone, which is no failure
@@ -315,6 +318,7 @@ def regular_file(path: str | Path, *, limit: float = math.inf) -> Path:
         raise InputError("is a pipe or a device, not a file", file=path)
     if found.st_size > limit:
         raise InputError(f"is too large ({found.st_size} bytes; at most {limit:.0f})", file=path)
+    guard.reading([path])
     return Path(path)
 
 

@@ -30,7 +30,7 @@ class _Checked(ModelMetaclass):
         try:
             return super().__call__(*args, **kwargs)
         except ValidationError as error:
-            raise _as_input_error(error, cls, None) from None  # type: ignore[arg-type]
+            raise as_input_error(error, cls, None) from None  # type: ignore[arg-type]
 
 
 class StrictModel(BaseModel, metaclass=_Checked):
@@ -123,12 +123,12 @@ def validate(
     try:
         return model.model_validate(content)
     except ValidationError as error:
-        raise _as_input_error(error, model, file) from None
+        raise as_input_error(error, model, file) from None
     except RecursionError:
         raise InputError("is nested too deeply", file=file) from None
 
 
-def _as_input_error(
+def as_input_error(
     error: ValidationError, model: type[BaseModel], file: str | Path | None
 ) -> InputError:
     """The most telling of pydantic's errors: a misspelt key explains a missing one."""

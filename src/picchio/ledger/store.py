@@ -24,6 +24,7 @@ import numpy as np
 from picchio.core.arrays import BoolArray, FloatArray, IndexArray
 from picchio.core.errors import InputError, OutputError
 from picchio.core.files import is_stream
+from picchio.core.guard import guard
 from picchio.ledger.samples import Samples
 
 FORMAT = "picchio-ledger/1"
@@ -279,6 +280,7 @@ class Ledger:
             a context manager.
         """
         with self._told():
+            guard.check()
             self._base.execute("BEGIN IMMEDIATE")
             try:
                 yield

@@ -26,7 +26,6 @@ from picchio.cli.options import (
     ToolOption,
 )
 from picchio.cli.output import (
-    check_targets,
     console,
     count_of,
     deliver,
@@ -198,7 +197,6 @@ def assess(
             drive_class=drive_class,
         )  # fmt: skip
     work = task_of(loaded, task, payload=payload)
-    check_targets((json, report), [*loaded.files, *work.files, sn_curve, logo])
     options: dict[str, Any] = {
         "sn_curve": sn_curve,
         "residue": residue,

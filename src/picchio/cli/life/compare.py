@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -10,7 +9,6 @@ import typer
 from picchio.cli.app import app
 from picchio.cli.options import FlexOption, JsonOption, ReportOption, TaskOption, ToolOption
 from picchio.cli.output import (
-    check_targets,
     console,
     deliver,
     progress,
@@ -53,7 +51,6 @@ def compare(
     """
     import picchio
 
-    check_targets((report, json), [*(i for i in items if Path(i).is_file()), task, flex])
     with progress("compared") as tick:
         found = picchio.compare(*items, task=task, robot=robot, flex=flex, tool=tool, progress=tick)
     write_report(found, report)

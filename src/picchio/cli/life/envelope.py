@@ -22,7 +22,7 @@ from picchio.cli.options import (
     WidthOption,
     pose_given,
 )
-from picchio.cli.output import check_targets, console, deliver, styled, table
+from picchio.cli.output import console, deliver, styled, table
 
 if TYPE_CHECKING:
     from picchio.core.arrays import FloatArray
@@ -52,7 +52,6 @@ def envelope(
     from picchio.studies.tasks import blows_of
 
     loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
-    check_targets([json], loaded.files)
     blows = blows_of(loaded, force=force, period=period, width=width)
     at = loaded.pose(pose_given(pose))
     warn_beyond_limits(loaded, [at], "the pose")

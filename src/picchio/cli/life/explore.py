@@ -17,8 +17,9 @@ from picchio.cli.options import (
     RobotArgument,
     TaskOption,
     ToolOption,
+    output,
 )
-from picchio.cli.output import check_targets, deliver, telling
+from picchio.cli.output import deliver, telling
 
 
 @app.command(epilog="Example: picchio explore fanuc_like_3dof --open")
@@ -34,9 +35,11 @@ def explore(
     ] = None,
     save: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="The task that a click puts the pose into; ROBOT-explored.toml if not given.",
+        output(
+            "--save",
+            "FILE",
+            "The task that a click puts the pose into; ROBOT-explored.toml if not given.",
+            added_to=True,
         ),
     ] = None,
     browser: Annotated[bool, typer.Option("--open", help="Open the page in the browser.")] = False,
@@ -53,8 +56,6 @@ def explore(
     import picchio
 
     loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
-    # The task may be both: a pose is added to it.
-    check_targets([json], [*loaded.files, task, model])
     with telling("loading the robot"):
         live = picchio.explore(loaded, task=task, model=model, save=save)
     try:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from picchio.cli.app import app
-from picchio.cli.options import JsonOption
-from picchio.cli.output import check_targets, console, deliver, styled, table, telling
+from picchio.cli.options import PICTURES, JsonOption, output
+from picchio.cli.output import console, deliver, styled, table, telling
 
 if TYPE_CHECKING:
     from picchio.fatigue.sn.fit import Estimate, SNFit
@@ -71,10 +71,11 @@ def fit_sn(
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Write the design curve (TOML) for --sn-curve."),
+        output("--out", "FILE", "Write the design curve (TOML) for --sn-curve."),
     ] = None,
     plot: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Draw tests and curve: .png, .svg or .pdf.")
+        Path | None,
+        output("--plot", "FILE", "Draw tests and curve: .png, .svg or .pdf.", *PICTURES),
     ] = None,
     json: JsonOption = None,
 ) -> None:
@@ -84,7 +85,6 @@ def fit_sn(
     """
     import picchio
 
-    check_targets((out, plot, json), [tests])
     with telling("fitting"):
         found = picchio.fit_sn(
             tests, kind=kind, survival=survival, level=level, run_out_cycles=run_out_cycles,

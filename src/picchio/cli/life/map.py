@@ -9,6 +9,8 @@ import typer
 
 from picchio.cli.app import app
 from picchio.cli.options import (
+    PAGES,
+    PICTURES,
     FlexOption,
     ForceOption,
     HitsOption,
@@ -19,9 +21,9 @@ from picchio.cli.options import (
     ToolOption,
     WidthOption,
     numbers,
+    output,
 )
 from picchio.cli.output import (
-    check_targets,
     console,
     deliver,
     notice_first,
@@ -38,15 +40,13 @@ if TYPE_CHECKING:
     from picchio.studies.maps.places import Places
     from picchio.studies.maps.result import WorkspaceMap
 
-_DRAWN = (".png", ".svg", ".pdf")
-
 
 @app.command(
     "map", epilog="Example: picchio map fanuc_like_3dof --plane xz --spacing 0.1 --out map.nc"
 )
 def map_(
     robot: RobotArgument,
-    out: Annotated[Path, typer.Option(metavar="FILE", help="map.nc (netCDF) or map.zarr (Zarr).")],
+    out: Annotated[Path, output("--out", "FILE", "map.nc (netCDF) or map.zarr (Zarr).")],
     plane: Annotated[
         str | None,
         typer.Option(metavar="PLANE", help="Points on a plane: xy, xz or yz; the default is xz."),
@@ -134,11 +134,13 @@ def map_(
     ] = None,
     plot: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Draw it, a joint below the other: .png, .svg or .pdf."),
+        output(
+            "--plot", "FILE", "Draw it, a joint below the other: .png, .svg or .pdf.", *PICTURES
+        ),
     ] = None,
     html: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="The map in 3-D, to turn and to cut, as one HTML file."),
+        output("--html", "FILE", "The map in 3-D, to turn and to cut, as one HTML file.", *PAGES),
     ] = None,
     json: JsonOption = None,
 ) -> None:
@@ -151,9 +153,6 @@ def map_(
 
     with notice_first(json):
         loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
-    check_targets((out, plot, html, json), [*loaded.files, points, surface])
-    if plot is not None and plot.suffix not in _DRAWN:
-        raise InputError("no such kind of picture", key="--plot", value=plot, choices=_DRAWN)
     where = _places(loaded, plane, at, box, points, surface, joint_grid, spacing, bounds)
     if direction is None:
         direction = "worst" if surface is None else "normal"

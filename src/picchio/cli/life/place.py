@@ -18,9 +18,9 @@ from picchio.cli.options import (
     TaskOption,
     ToolOption,
     numbers,
+    output,
 )
 from picchio.cli.output import (
-    check_targets,
     console,
     deliver,
     notice_first,
@@ -83,7 +83,7 @@ def place(
     ] = True,
     seed: Annotated[int, typer.Option(metavar="N", min=0, help="Random seed of the search.")] = 0,
     out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write the task with the work moved (TOML).")
+        Path | None, output("--out", "FILE", "Write the task with the work moved (TOML).")
     ] = None,
     json: JsonOption = None,
 ) -> None:
@@ -103,7 +103,6 @@ def place(
     with notice_first(json):
         loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
     work = task_of(loaded, task)
-    check_targets((json, out), [*loaded.files, *work.files, sn_curve])
     with progress("steps of the search") as tick:
         found = picchio.place(
             loaded,

@@ -9,7 +9,7 @@ import typer
 
 from picchio.cli.app import app
 from picchio.cli.options import ClassOption, JsonOption, PayloadOption, ReachOption, ToolOption
-from picchio.cli.output import check_targets, console, count_of, deliver, styled, table
+from picchio.cli.output import console, count_of, deliver, styled, table, to_write
 from picchio.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -63,7 +63,8 @@ def start(
         robot, tool=tool, payload=payload, reach=reach, drive_class=drive_class, reducers=named,
         seed=seed,
     )  # fmt: skip
-    check_targets([*(out / name for name in found.names), json], found.inputs)
+    for name in found.names:
+        to_write(out / name, "--out")
     found.save(out, force=force)
     deliver(found.to_dict(), json, lambda: _show(found, out))
 

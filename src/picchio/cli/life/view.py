@@ -10,6 +10,7 @@ import typer
 from picchio.cli.app import app
 from picchio.cli.ending import ending
 from picchio.cli.options import (
+    PAGES,
     POSE_HELP,
     FlexOption,
     ForceOption,
@@ -21,9 +22,10 @@ from picchio.cli.options import (
     TaskOption,
     ToolOption,
     WidthOption,
+    output,
     pose_given,
 )
-from picchio.cli.output import check_targets, deliver, progress, telling
+from picchio.cli.output import deliver, progress, telling
 from picchio.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -33,12 +35,14 @@ if TYPE_CHECKING:
 @app.command(epilog="Example: picchio view fanuc_like_3dof --out scene.html")
 def view(
     robot: RobotArgument,
-    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Where the HTML goes.")] = None,
+    out: Annotated[Path | None, output("--out", "FILE", "Where the HTML goes.", *PAGES)] = None,
     rerun: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Write the vibration as a Rerun recording (.rrd); needs picchio[rerun].",
+        output(
+            "--rerun",
+            "FILE",
+            "Write the vibration as a Rerun recording (.rrd); needs picchio[rerun].",
+            ".rrd",
         ),
     ] = None,
     live: Annotated[
@@ -88,7 +92,6 @@ def view(
     if out is None and rerun is None and not live:
         raise InputError("needs a file", key="--out", hint="--out scene.html, or --live")
     loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
-    check_targets((out, rerun, json), [*loaded.files, task, map_, diagnosis])
     blows = None
     if pose is not None:
         blows = blows_of(loaded, task, force=force, period=period, width=width)

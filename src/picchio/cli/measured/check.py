@@ -19,7 +19,6 @@ from picchio.cli.options import (
     ToolOption,
 )
 from picchio.cli.output import (
-    check_targets,
     console,
     count_of,
     deliver,
@@ -92,7 +91,6 @@ def check(
     loaded = picchio.load_campaign(campaign, clock_tolerance=math.inf)
     if report is not None and (no_robot or (robot or loaded.robot) is None):
         raise InputError("needs a robot", key="--report", hint="name one with --robot")
-    check_targets((json, report), [robot, flex, *(reducers or ()), *loaded.files])
     with progress("records") as tell:
         found = picchio.check(
             loaded, robot, flex=flex, tool=tool, reducers=reducers or (), use_robot=not no_robot,

@@ -20,9 +20,9 @@ from picchio.cli.options import (
     SNCurveOption,
     TaskOption,
     ToolOption,
+    output,
 )
 from picchio.cli.output import (
-    check_targets,
     console,
     count_of,
     deliver,
@@ -30,9 +30,11 @@ from picchio.cli.output import (
     progress,
     styled,
     table,
+    to_write,
     write_report,
 )
 from picchio.core.errors import InputError
+from picchio.core.guard import guard
 from picchio.robot.annotations.flexibility import estimate_notice
 from picchio.studies.assessment.result import format_count
 
@@ -90,11 +92,11 @@ def count(
     ] = None,
     prometheus: Annotated[
         Path | None,
-        typer.Option(metavar="FILE.prom", help="Write the figures as Prometheus reads them."),
+        output("--prometheus", "FILE.prom", "Write the figures as Prometheus reads them."),
     ] = None,
     mcap: Annotated[
         Path | None,
-        typer.Option(metavar="FILE.mcap", help="Write diagnostic_msgs/DiagnosticArray (ROS 2)."),
+        output("--mcap", "FILE.mcap", "Write diagnostic_msgs/DiagnosticArray (ROS 2).", ".mcap"),
     ] = None,
     seed: Annotated[int, typer.Option(metavar="N", min=0, help="Random seed of the draws.")] = 0,
     report: ReportOption = None,
@@ -118,7 +120,8 @@ def count(
                              key="--fleet")  # fmt: skip
         from picchio.ledger.fleet import count_fleet
 
-        check_targets((json, report), [*loaded.files, mapping, task, sn_curve])
+        guard.reading(log[0].glob("*/**/*"))  # they are opened in other processes
+
         with progress("robots") as tick:
             rows = count_fleet(loaded, log[0], ledger, mapping=mapping, task=task,
                                sn_curve=sn_curve, seed=seed, workers=workers, scheduler=scheduler,
@@ -126,8 +129,7 @@ def count(
         write_report(rows, report)
         deliver(rows.to_dict(), json, lambda: _show_fleet(rows))
         return
-    targets = (json, report, prometheus, mcap, ledger)
-    check_targets(targets, [*loaded.files, mapping, task, sn_curve])
+    to_write(ledger, "--ledger", added_to=True)
     before: list[tuple[str, int, int]] | None = None
     while True:
         now = _listing(log or [])

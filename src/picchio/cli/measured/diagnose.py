@@ -19,9 +19,9 @@ from picchio.cli.options import (
     ReportOption,
     RobotArgument,
     ToolOption,
+    output,
 )
 from picchio.cli.output import (
-    check_targets,
     console,
     count_of,
     deliver,
@@ -68,16 +68,17 @@ def diagnose(
     ] = None,
     model: Annotated[
         Path | None,
-        typer.Option(
-            metavar="OUT.toml", help="Write the extended model; every command takes it as ROBOT."
+        output(
+            "--model",
+            "OUT.toml",
+            "Write the extended model; every command takes it as ROBOT.",
+            ".toml",
         ),
     ] = None,
     report: ReportOption = None,
     plan: Annotated[
         Path | None,
-        typer.Option(
-            metavar="OUT.toml", help="Write what to measure next, for `picchio simulate`."
-        ),
+        output("--plan", "OUT.toml", "Write what to measure next, for `picchio simulate`."),
     ] = None,
     flex: FlexOption = None,
     tool: ToolOption = None,
@@ -98,10 +99,7 @@ def diagnose(
         effect_class(name)
     campaign = picchio.load_campaign(data)
     moves = {record.kind for record in campaign} == {"motion"}
-    loaded = picchio.load_robot(
-        robot, flex=flex, tool=tool, reducers=reducers or (), allow_rigid=moves
-    )
-    check_targets((json, report, model, plan), [*loaded.files, *campaign.files, task])
+    picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or (), allow_rigid=moves)
     with telling("reading the data") as say:
         found = picchio.diagnose(
             robot,

@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from picchio.cli.app import app
 from picchio.cli.options import (
     DataOption,
@@ -16,9 +14,9 @@ from picchio.cli.options import (
     ReportOption,
     RobotArgument,
     ToolOption,
+    output,
 )
 from picchio.cli.output import (
-    check_targets,
     console,
     deliver,
     say_warning,
@@ -27,7 +25,6 @@ from picchio.cli.output import (
     telling,
     write_report,
 )
-from picchio.core.errors import InputError
 from picchio.core.files import write_text
 
 if TYPE_CHECKING:
@@ -41,7 +38,7 @@ if TYPE_CHECKING:
 def identify(
     robot: RobotArgument,
     data: DataOption,
-    out: Annotated[Path, typer.Option(metavar="SIDECAR.toml", help="Where the sidecar goes.")],
+    out: Annotated[Path, output("--out", "SIDECAR.toml", "Where the sidecar goes.")],
     flex: FlexOption = None,
     tool: ToolOption = None,
     reducers: ReducersOption = None,
@@ -57,17 +54,11 @@ def identify(
     import picchio
     from picchio.diagnosis.identify import needs_springs
 
-    if str(out) == "-":
-        raise InputError("must be a file", key="--out", value=str(out))
-    check_targets((out, report, json), [flex])
     campaign = picchio.load_campaign(data)
     loaded = picchio.load_robot(
         robot, flex=flex, tool=tool, reducers=reducers or (),
         allow_rigid=not needs_springs(campaign),
     )  # fmt: skip
-    files = [*loaded.files, *campaign.files]
-    check_targets([out], files)
-    check_targets([report, json], [*files, out])
     with telling("reading the data") as say:
         found = picchio.identify(loaded, campaign, progress=say)
     write_text(out, found.sidecar_text())

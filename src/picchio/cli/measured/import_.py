@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from picchio.cli.app import app
-from picchio.cli.options import JsonOption
-from picchio.cli.output import check_targets, console, deliver
+from picchio.cli.options import JsonOption, folder, output
+from picchio.cli.output import console, deliver
 from picchio.core.errors import InputError
 
 
@@ -27,19 +27,18 @@ def import_(
             ".mat, .lvm, .npz or JSON lines (.jsonl).",
         ),
     ],
-    to: Annotated[
-        Path | None, typer.Option(metavar="CAMPAIGN", help="The folder of the campaign.")
-    ] = None,
+    to: Annotated[Path | None, folder("--to", "CAMPAIGN", "The folder of the campaign.")] = None,
     mapping: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Which channels the file's series become (TOML)."),
     ] = None,
     write_mapping: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Write a mapping that lists the file's series, to edit, and stop there. Series "
-            "that are named as channels or joints, with their units, are filled in.",
+        output(
+            "--write-mapping",
+            "FILE",
+            "Write a mapping that lists the file's series, to edit, and stop there. Series that "
+            "are named as channels or joints, with their units, are filled in.",
         ),
     ] = None,
     robot: Annotated[
@@ -69,7 +68,6 @@ def import_(
 
         if to is not None or mapping is not None:
             raise InputError("stands alone: edit the mapping, then import", key="--write-mapping")
-        check_targets([write_mapping], [file])
         model = None if robot is None else picchio.load_robot(robot)
         joints = None if model is None else model.joint_names
         frames = None if model is None else [*model.tree.links, *model.tree.joints]
@@ -86,13 +84,11 @@ def import_(
     if to is None and mapping is None:
         from picchio.campaign.importing.importer import detection
 
-        check_targets([json], [file])
         seen = detection(file)
         deliver(seen.to_dict(), json, lambda: console().print("\n".join(seen.told)))
         return
     if to is None:
         raise InputError("say where the campaign goes", key="--to")
-    check_targets([json], [file, mapping], folder=to)
     made = picchio.import_record(file, to, mapping, name=name, append=append)
     channels = ", ".join(made.record.channels)
 

@@ -16,9 +16,9 @@ from picchio.cli.options import (
     RobotArgument,
     TaskOption,
     ToolOption,
+    folder,
 )
 from picchio.cli.output import (
-    check_targets,
     console,
     deliver,
     notice_first,
@@ -56,9 +56,10 @@ def plan(
     ] = None,
     to: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FOLDER",
-            help="Where the campaign goes: a form to fill in, plan.toml, sheet.html to print.",
+        folder(
+            "--to",
+            "FOLDER",
+            "Where the campaign goes: a form to fill in, plan.toml, sheet.html to print.",
         ),
     ] = None,
     overwrite: Annotated[
@@ -84,7 +85,6 @@ def plan(
     with notice_first(json):
         loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
     work = task_of(loaded, task)
-    check_targets((report, json), [*loaded.files, *work.files], folder=to)
     with telling("planning") as say:
         found = picchio.plan(
             loaded, work, budget=budget, instruments=hands, force=force, seed=seed, progress=say

@@ -15,8 +15,9 @@ from picchio.cli.options import (
     ReducersOption,
     RobotArgument,
     ToolOption,
+    folder,
 )
-from picchio.cli.output import check_targets, console, deliver, progress
+from picchio.cli.output import console, deliver, progress
 
 if TYPE_CHECKING:
     from picchio.prediction.simulation import Simulation
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 def simulate(
     robot: RobotArgument,
     plan: Annotated[Path, typer.Option(metavar="PLAN.toml", help="The test plan.")],
-    to: Annotated[Path, typer.Option(metavar="CAMPAIGN", help="The folder of the campaign.")],
+    to: Annotated[Path, folder("--to", "CAMPAIGN", "The folder of the campaign.")],
     flex: FlexOption = None,
     tool: ToolOption = None,
     reducers: ReducersOption = None,
@@ -51,7 +52,6 @@ def simulate(
     import picchio
 
     loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
-    check_targets([json], [*loaded.files, plan], folder=to)
     with progress("records") as report:
         made = picchio.simulate(
             loaded,

@@ -9,7 +9,6 @@ import typer
 from picchio.cli.app import app
 from picchio.cli.options import JsonOption, ReportOption
 from picchio.cli.output import (
-    check_targets,
     console,
     deliver,
     progress,
@@ -47,10 +46,8 @@ def reproduce(
     """
     import picchio
     from picchio.paper.assumptions import parse_assumptions
-    from picchio.paper.printed import paper_file
     from picchio.paper.study import WORLDS
 
-    check_targets((report, json), [paper_file()])
     given = parse_assumptions(assume or [])
     with progress("hypotheses about Table 2") as told:
         found = picchio.reproduce(given, worlds=WORLDS if worlds is None else worlds, progress=told)

@@ -5,11 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from picchio.cli.app import app
-from picchio.cli.options import FlexOption, JsonOption, RobotArgument
-from picchio.cli.output import check_targets, console, deliver, table
+from picchio.cli.options import FlexOption, JsonOption, RobotArgument, output
+from picchio.cli.output import console, deliver, table
 
 if TYPE_CHECKING:
     from picchio.robot.loading.catalogue import RobotEntry, RobotList
@@ -27,7 +25,7 @@ def robots(json: JsonOption = None) -> None:
 @app.command(epilog="Example: picchio annotate ur10 --flex my_ur10.toml --out robot.urdf")
 def annotate(
     robot: RobotArgument,
-    out: Annotated[Path, typer.Option(metavar="FILE", help="Where the URDF goes.")],
+    out: Annotated[Path, output("--out", "FILE", "Where the URDF goes.")],
     flex: FlexOption = None,
     json: JsonOption = None,
 ) -> None:
@@ -38,7 +36,6 @@ def annotate(
     import picchio
 
     made = picchio.annotate(robot, flex=flex)
-    check_targets((out, json), [made.urdf, made.sidecar])
     made.save(out)
     deliver(made.to_dict(), json, lambda: console().print(made._headline()))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 from lxml import etree
 
 from picchio.core.errors import InputError, gathered, held_back, warn_user
+from picchio.core.guard import guard
 from picchio.core.toml import validate
 from picchio.robot.annotations.flexibility import (
     ESTIMATE,
@@ -37,6 +39,7 @@ from picchio.robot.loading.saved_model import is_saved_model, read_saved_model
 from picchio.robot.masses.check import check_masses
 from picchio.robot.masses.doubts import findings_of
 from picchio.robot.masses.given import give_masses
+from picchio.robot.urdf.addresses import resolve_mesh
 from picchio.robot.urdf.check import read_tree
 from picchio.robot.urdf.normalised import normalise
 from picchio.robot.urdf.tree import UrdfTree
@@ -211,6 +214,9 @@ def _load(
         spreads={spread.name: spread for spread in spreads},
         posterior=choose_posterior(sources, spreads),
     )
+    for mesh in root.iter("mesh"):
+        with suppress(InputError):  # whoever draws it says what is wrong
+            guard.reading([resolve_mesh(str(mesh.get("filename")), found.urdf.parent)])
     check_masses(result)
     findings = tuple(findings_of(result, root))
     for finding in findings:

@@ -75,6 +75,7 @@ class Explorer(Result):
     def _repr_html_(self) -> str:
         # Where the page cannot be had (the kernel has ended, or runs elsewhere) a browser shows
         # what stands within the object instead: the robot as it stood, and why.
+        self._server.framed = True
         name, url = escape(self.session.robot.name), escape(self.url)
         return (
             f'<object title="{name}" type="text/html" data="{url}" '

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import re
 import secrets
 import threading
 from collections.abc import Iterator
@@ -20,10 +21,13 @@ from tornado.web import Application, HTTPError, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
 from picchio.core.errors import PicchioError
+from picchio.visuals.live.gesture import Gesture
 from picchio.visuals.live.session import COARSE, FINE, Session
 from picchio.visuals.scene.page import POLICY
 
 _STILL = 0.35  # s without a gesture: the hand rests
+# Where notebooks show pages that run on this machine.
+_NOTEBOOKS = "http://127.0.0.1:* http://localhost:* vscode-webview:"
 _LONGEST = 100_000  # bytes of a message
 
 
@@ -40,9 +44,10 @@ class Server:
         self._word = secrets.token_urlsafe(12)
         self._sockets: set[_Socket] = set()
         self._asked = asyncio.Event()
-        self._gestures: list[dict[str, Any]] = []
+        self._gestures: list[Gesture] = []
         self._ball: tuple[int, Iterator[dict[str, Any] | None]] | None = None
         self.port = 0
+        self.framed = False  # whether a notebook shows it
         self._ready = threading.Event()
         self._failed: BaseException | None = None
         self._thread = threading.Thread(target=self._run, name="picchio explore", daemon=True)
@@ -104,11 +109,11 @@ class Server:
         await asyncio.sleep(0.05)
 
     # --- answers ----------------------------------------------------------------------------
-    def ask(self, gesture: dict[str, Any]) -> None:
+    def ask(self, gesture: Gesture) -> None:
         """Take a gesture; it is answered in its turn.
 
         Args:
-            gesture: as `Session.take` has it, and its number, "id".
+            gesture: as `Session.take` has it.
         """
         self._gestures.append(gesture)
         self._asked.set()
@@ -123,9 +128,9 @@ class Server:
                 try:
                     self.session.take(gesture)
                     problem = None
-                except PicchioError as error:
-                    problem = str(error)
-                self.tell(answers=gesture.get("id"), problem=problem, began=began)
+                except Exception as error:  # the page waits for an answer, whatever it is
+                    problem = _problem(error)
+                self.tell(answers=gesture.id, problem=problem, began=began)
                 await asyncio.sleep(0)
                 # A piece of the envelope at a time: the next gesture may be waiting.
                 await self._draw(COARSE, pieces=1)
@@ -145,8 +150,8 @@ class Server:
                 await asyncio.sleep(0)
                 if self._gestures:
                     return
-        except PicchioError as error:
-            self.tell(problem=str(error))
+        except Exception as error:
+            self.tell(problem=_problem(error))
             return
         self.tell(settled=True)
         await self._draw(FINE)
@@ -158,7 +163,7 @@ class Server:
         for _ in range(pieces):
             try:
                 ball = next(self._ball[1])
-            except (StopIteration, PicchioError):  # the values tell what is wrong
+            except Exception:  # at its end; the values tell what is wrong
                 self._ball = None
                 return True
             if ball is not None:
@@ -216,7 +221,15 @@ class _Page(RequestHandler):
         if not self._server.own(self.request.host):
             raise HTTPError(403)
         where = self.request.host
-        self.set_header("Content-Security-Policy", f"{POLICY}; connect-src ws://{where}")
+        # A notebook that shows it is a page of this machine; else nobody frames it.
+        frames = _NOTEBOOKS if self._server.framed else "'none'"
+        self.set_header(
+            "Content-Security-Policy",
+            f"{POLICY}; connect-src ws://{where}; frame-ancestors {frames}",
+        )
+        if not self._server.framed:
+            self.set_header("X-Frame-Options", "DENY")
+        self.set_header("X-Content-Type-Options", "nosniff")
         self.set_header("Cache-Control", "no-store")
         self.set_header("Referrer-Policy", "no-referrer")
         self.finish(self._server._page)
@@ -227,40 +240,45 @@ class _Socket(WebSocketHandler):
         self._server = server
 
     def check_origin(self, origin: str) -> bool:
-        return self._server.own(origin.removeprefix("http://"))
+        return origin == f"http://{self.request.host}"
 
     def prepare(self) -> None:
-        if not self._server.own(self.request.host):
+        # Tornado asks `check_origin` only where there is an origin.
+        origin = self.request.headers.get("Origin", "")
+        if not self._server.own(self.request.host) or not self.check_origin(origin):
             raise HTTPError(403)
 
     def open(self, *_: str, **__: str) -> None:
         self.set_nodelay(True)
         self._server._sockets.add(self)
-        self._server.ask({"id": None})
+        self._server.ask(Gesture())
 
     def on_close(self) -> None:
         self._server._sockets.discard(self)
 
     def on_message(self, message: str | bytes) -> None:
+        server = self._server
         try:
-            gesture = json.loads(message)
-        except ValueError:
+            gesture = Gesture.of(message)
+        except PicchioError as error:
+            # Its number, where it has one that can be read, so that the page asks on.
+            found = re.search(r'"id"\s*:\s*(\d{1,15})\b', str(message))
+            server.tell(answers=int(found[1]) if found else None, problem=str(error))
             return
-        if not isinstance(gesture, dict):
+        if not (gesture.write or gesture.toml):
+            server.ask(gesture)
             return
-        session = self._server.session
-        if gesture.get("write"):
-            try:
-                count = session.add()
-                said = {"written": str(session.file), "poses": count}
-            except PicchioError as error:
-                said = {"problem": str(error)}
-            self.write_message(json.dumps({"file": said}))
-        elif gesture.get("toml"):
-            try:
+        session, said = server.session, {}
+        try:
+            if gesture.write:
+                said = {"written": str(session.file), "poses": session.add()}
+            else:
                 said = {"toml": session.toml()}
-            except PicchioError as error:
-                said = {"problem": str(error)}
-            self.write_message(json.dumps({"file": said}))
-        else:
-            self._server.ask(gesture)
+        except Exception as error:
+            said = {"problem": _problem(error)}
+        self.write_message(json.dumps({"file": said}))
+
+
+def _problem(error: Exception) -> str:
+    """What a page says of an error; one that is not ours is a fault of the program."""
+    return str(error) if isinstance(error, PicchioError) else f"cannot be answered: {error!r}"

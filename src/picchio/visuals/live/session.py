@@ -21,6 +21,7 @@ from picchio.studies.instant import Instant, InstantStudy, Place
 from picchio.studies.placement.self_collision import SelfCollision
 from picchio.studies.task_file import add_place, task_text
 from picchio.vibration.closed_form.response import unit_vector
+from picchio.visuals.live.gesture import Blows, Gesture
 
 FORMAT = "picchio-exploration/1"
 # Cases of a life's interval, and fineness of the envelope: while dragging, and at rest.
@@ -78,47 +79,45 @@ class Session:
         return use if (use >= 0.0).any() else found.peak_deflection
 
     # --- gestures ---------------------------------------------------------------------------
-    def take(self, gesture: Mapping[str, Any]) -> None:
-        """Do what a hand did: any of these keys, at once.
+    def take(self, gesture: Gesture | Mapping[str, Any]) -> None:
+        """Do what a hand did.
 
         Args:
-            gesture: "joints" {index: rad or m}, "tool" [x, y, z] m, "direction" [x, y, z],
-                "blows" {"force", "rate", "width", "preload", "hits"}, "worst" (index of a joint),
-                "along_tool", "home", "keeps_axis", "joint" (whose envelope is shown).
+            gesture: any of the keys of `Gesture`, at once.
 
         Raises:
             InputError: a value out of range; nothing has changed then.
         """
+        asked = Gesture.of(gesture)
         pose, direction = self.place.pose.copy(), self.place.direction
         excitation, hits = self.place.excitation, self.place.hits
         keeps, chosen = self.keeps_axis, self.joint
         notes: list[str] = []
-        if gesture.get("home"):
+        if asked.home:
             pose, direction = self.home.pose.copy(), self.home.direction
             excitation, hits = self.home.excitation, self.home.hits
-        if "keeps_axis" in gesture:
-            keeps = bool(gesture["keeps_axis"]) and self.follower.aims
-        if "joint" in gesture:
-            chosen = self._index(gesture["joint"], len(self.robot.flexible_names))
-        for key, value in dict(gesture.get("joints", {})).items():
+        if asked.keeps_axis is not None:
+            keeps = asked.keeps_axis and self.follower.aims
+        if asked.joint is not None:
+            chosen = self._index(asked.joint, len(self.robot.flexible_names))
+        for key, value in asked.joints.items():
             j = self._index(key, len(pose))
-            low, high = self.robot.lower[j], self.robot.upper[j]
-            pose[j] = min(max(_number(value, self.robot.joint_names[j]), low), high)
-        if "tool" in gesture:
-            point = _three(gesture["tool"], "tool")
+            pose[j] = min(max(value, self.robot.lower[j]), self.robot.upper[j])
+        if asked.tool is not None:
+            point = np.array(asked.tool)
             axis = self._axis(self.place.pose) if keeps else None
             pose, missed = self.follower.follow(pose, point, axis)
             if missed > _OUT:
                 far = f"{missed:.3g} m" if missed >= 1.0 else f"{1e3 * missed:.3g} mm"
                 notes.append(f"the tool is {far} short of that place")
-        if "blows" in gesture:
-            excitation, hits = self._blows(dict(gesture["blows"]), excitation, hits)
-        if "direction" in gesture:
-            direction = unit_vector(_three(gesture["direction"], "direction"))
-        if gesture.get("along_tool"):
+        excitation = self._blows(asked.blows, excitation)
+        hits = asked.blows.hits or hits
+        if asked.direction is not None:
+            direction = unit_vector(np.array(asked.direction))
+        if asked.along_tool:
             direction = -self._axis(pose)
-        if "worst" in gesture:
-            j = self._index(gesture["worst"], len(self.robot.flexible_names))
+        if asked.worst is not None:
+            j = self._index(asked.worst, len(self.robot.flexible_names))
             here = dataclasses.replace(self.place, pose=pose, excitation=excitation, hits=hits)
             worst = next(iter(self.studies.values())).values(here).worst_direction[j]
             if not np.isfinite(worst).all():
@@ -131,7 +130,7 @@ class Session:
         self.place = Place(pose, direction, excitation, hits)
         try:
             self.answer()
-        except InputError:
+        except Exception:
             self.place, self.last = before
             raise
         self.keeps_axis, self.joint, self.notes = keeps, chosen, notes
@@ -142,28 +141,20 @@ class Session:
         axis = turn @ np.array(self.robot.tool.axis)
         return np.asarray(axis / np.linalg.norm(axis))
 
-    def _index(self, value: Any, count: int) -> int:
-        number = int(value) if str(value).isdecimal() else -1
-        if not 0 <= number < count:
-            raise InputError("no such joint", key="joint", value=value)
+    def _index(self, number: int, count: int) -> int:
+        if number >= count:
+            raise InputError(f"no such joint: there are {count}", key="joint", value=number)
         return number
 
-    def _blows(self, asked: dict[str, Any], blows: Any, hits: int) -> tuple[Any, int]:
-        if "hits" in asked:
-            hits = int(_number(asked.pop("hits"), "hits"))
-            if not 1 <= hits <= 1000:
-                raise InputError("must lie between 1 and 1000", key="hits", value=hits)
-        if "rate" in asked:
-            rate = _number(asked.pop("rate"), "rate")
-            if rate <= 0.0:
-                raise InputError("must be positive", key="rate", value=rate)
-            asked["period"] = 1.0 / rate
-        changes = {key: _number(value, key) for key, value in asked.items()}
+    def _blows(self, asked: Blows, blows: Any) -> Any:
+        changes = asked.model_dump(exclude_none=True, exclude={"hits"})
+        if "rate" in changes:
+            changes["period"] = 1.0 / changes.pop("rate")
         for key in changes:
             if key not in self.blow_keys:
                 raise InputError(f"blows of the kind {blows.kind} have no such number to change",
                                  key=key, choices=self.blow_keys)  # fmt: skip
-        return (dataclasses.replace(blows, **changes) if changes else blows), hits
+        return dataclasses.replace(blows, **changes) if changes else blows
 
     @property
     def blow_keys(self) -> list[str]:
@@ -293,15 +284,3 @@ class Session:
 def _count(value: float) -> float | str:
     """A number of rivets; one without end as the word, which JSON has no number for."""
     return "no end" if math.isinf(value) else float(f"{value:.6g}")
-
-
-def _number(value: Any, key: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise InputError("is not a finite number", key=key, value=value)
-    return float(value)
-
-
-def _three(value: Any, key: str) -> FloatArray:
-    if not isinstance(value, list) or len(value) != 3:
-        raise InputError("must be three numbers", key=key, value=value)
-    return np.array([_number(each, key) for each in value])
