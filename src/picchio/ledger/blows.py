@@ -10,7 +10,7 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray, IndexArray
 from picchio.core.errors import InputError
-from picchio.ledger.store import Kept, magnitude, pieces
+from picchio.ledger.store import Kept, pieces
 from picchio.model.model import Model
 from picchio.studies.tasks import Operation
 
@@ -121,7 +121,7 @@ def uncovered(blows: Iterable[Blow], intervals: IndexArray) -> Iterator[Blow]:
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """Neighbouring samples above the foot of which one exceeds the threshold.
+    """Neighbouring samples that may be a blow, or some: see `Stream.active`.
 
     Attributes:
         onset: ns, its first sample.
@@ -150,21 +150,17 @@ def runs(kept: Kept) -> list[Run]:
         InputError: no pose anywhere.
     """
     stream, found = kept.stream, []
-    size = magnitude(kept.values)
+    size = stream.size(kept.values)
+    around = 0 if stream.hold else 1
     for piece in pieces(kept.stamps, stream.gap):
         own, stamps, values = size[piece], kept.stamps[piece], kept.values[piece]
-        active = own > stream.foot
-        edge = np.diff(active.astype(np.int8), prepend=0, append=0)
-        start, end = np.flatnonzero(edge == 1), np.flatnonzero(edge == -1)
-        if not start.size:
-            continue
-        tops = np.maximum.reduceat(np.where(active, own, 0.0), start)
-        for a, b in zip(start[tops > stream.threshold], end[tops > stream.threshold], strict=True):
-            first, last = max(a - 1, 0), min(b + 1, own.size)
+        for a, b in zip(*stream.active(stamps, own), strict=True):
+            first, last = max(a - around, 0), min(b + around, own.size)
             at = np.searchsorted(kept.pose_stamps, stamps[a], side="right") - 1
             if not len(kept.poses):
                 raise InputError("no position was logged, so that nobody knows where the robot "
-                                 "stood", key="channel")  # fmt: skip
+                                 "stood", key="channel",
+                                 hint="a robot that never moves: [blows] pose")  # fmt: skip
             found.append(
                 Run(
                     int(stamps[a]), int(stamps[b - 1]), stamps[first:last], values[first:last],

@@ -41,8 +41,8 @@ from picchio.studies.tasks import Task
 
 MAPPING = "mapping.toml"
 _AT_ONCE = 256  # bursts that are held
-_READ = 4  # what is read of a log: where that becomes more, logs that are there are read anew
-_COUNTED = 1  # how a shift is counted: where that changes, shifts are counted anew
+_READ = 5  # what is read of a log: where that becomes more, logs that are there are read anew
+_COUNTED = 2  # how a shift is counted: where that changes, shifts are counted anew
 
 
 @one_thread()
@@ -156,6 +156,11 @@ def _notes(counted: Counted, rules: Mapping | None, model: Model) -> tuple[str, 
     if counted.cut:
         notes.append(
             f"{counted.cut} blows are cut by the end of a log whose neighbour is not there yet"
+        )
+    if counted.steady:
+        notes.append(
+            f"no separate blows in {counted.steady:.3g} s: the reading is as even as a turning "
+            "tool's, and nothing is counted there"
         )
     if counted.forgotten:
         notes.append(
@@ -271,7 +276,7 @@ def add_log(
     ])  # fmt: skip
     plan = rules.model_dump(mode="json", exclude={"record", "campaign"}, by_alias=True)
     poses = [op.poses.tolist() for op in task.operations]
-    forces = [op.excitation.peak_force for op in task.operations]
+    forces = [(op.excitation.peak_force, op.excitation.period) for op in task.operations]
     told = json.dumps([plan, robot.joint_names, forces, poses, _READ], sort_keys=True)
     how = hashlib.sha256(told.encode()).hexdigest()
     if book.holds(seen, how, "file"):
@@ -326,11 +331,14 @@ def recount(book: Ledger, model: Model, curves: Sequence[SNCurve | None], task: 
         text = book.told(number, key)
         if text is None:
             part, shown = Counted(curves), Shown(model)
-            grouped = bursts(blows_held(book, streams, model, task, number * SHIFT), rest)
+            steady: dict[int, int] = {}
+            blows = blows_held(book, streams, model, task, number * SHIFT, steady)
+            grouped = bursts(blows, rest)
             while some := list(islice(grouped, _AT_ONCE)):
                 part.add(some, burst_damages_of(bare, curves, some))
                 shown.add(some)
             shown.read(book.features(number))
+            part.steady = sum(ns for at, ns in steady.items() if at // SHIFT == number) * 1e-9
             text = json.dumps(part.told | {"shown": shown.told})
             book.tell(number, key, text)
         told = json.loads(text)
@@ -362,8 +370,9 @@ def streams_of(book: Ledger) -> tuple[Streams, IndexArray]:
 
 
 def blows_held(
-    book: Ledger, streams: Streams, model: Model, task: Task, first: int
-) -> Iterator[Blow]:
+    book: Ledger, streams: Streams, model: Model, task: Task, first: int,
+    steady: dict[int, int] | None = None,
+) -> Iterator[Blow]:  # fmt: skip
     """The blows of all logs of a ledger from some time until its shift ends, by time.
 
     Args:
@@ -372,6 +381,7 @@ def blows_held(
         model: the robot and its effects.
         task: whose blows are assumed where none are seen.
         first: ns.
+        steady: as of `blows_of`.
 
     Raises:
         InputError: see `blows_of`.
@@ -380,7 +390,10 @@ def blows_held(
     # A moment of the robot counts once: by the surest stream that saw it.
     sources = [
         uncovered(
-            blows_of(stream, book.kept(stream, (first - MARGIN, end + MARGIN)), model, task), over
+            blows_of(
+                stream, book.kept(stream, (first - MARGIN, end + MARGIN)), model, task, steady
+            ),
+            over,
         )
         for stream, over in streams
     ]

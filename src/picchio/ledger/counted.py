@@ -87,6 +87,7 @@ class Counted:
         self.kinds: Counter[str] = Counter()
         self.cut = 0
         self.forgotten = 0  # places
+        self.steady = 0.0  # s, of a tool without separate blows
         self.first = self.last = 0  # ns, onsets
         self.stretches: list[Stretch] = []
         self._each = 1  # bursts of a stretch
@@ -120,6 +121,7 @@ class Counted:
         whole = self._sum.burst
         return {
             "first": self.first, "last": self.last, "cut": self.cut, "forgotten": self.forgotten,
+            "steady": self.steady,
             "kinds": self.kinds, "closed": whole.closed.tolist(), "alone": whole.alone.tolist(),
             "residue": [part.tolist() for part in whole.residue],
             "hours": {hour: row.tolist() for hour, row in self._hours.items()},
@@ -133,6 +135,7 @@ class Counted:
         Args:
             told: as `told` gives it.
         """
+        self.steady += told["steady"]
         if not told["first"]:
             return
         self.first, self.last = self.first or told["first"], told["last"]

@@ -14,6 +14,7 @@ from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.ledger.blows import Blow, Run, Shape, assumed, measured, runs
 from picchio.ledger.damage import unscaled
+from picchio.ledger.jolts import jolts
 from picchio.ledger.samples import STEPS, Samples
 from picchio.ledger.store import Kept, Stream
 from picchio.model.many_poses import ManyPoses
@@ -54,6 +55,8 @@ def stream_of(samples: Samples, rules: Mapping, task: Task, robot: FlexibleRobot
     rest = 0.0
     if kind == "acceleration":
         settings["sensor"] = list(samples.names)
+        meant = _operations(task, settings["operation"], None)
+        settings["hold"] = round(2e9 * max(op.excitation.period for op in meant))
         rest = _AT_REST * samples.names[0].startswith("accelerometer")
         if threshold is None:
             weakest = _felt_least(settings, task, robot)
@@ -115,7 +118,8 @@ def standing(samples: Samples, task: Task) -> Samples:
 
 
 def blows_of(
-    stream: Stream, parts: Iterable[Kept], model: Model, task: Task
+    stream: Stream, parts: Iterable[Kept], model: Model, task: Task,
+    steady: dict[int, int] | None = None,
 ) -> Iterator[Blow]:  # fmt: skip
     """The blows of a stream, by time.
 
@@ -124,6 +128,7 @@ def blows_of(
         parts: what the ledger holds of it, by time: no run crosses two of them.
         model: the robot, and the effects on blows that are assumed.
         task: whose blows are assumed where none are seen.
+        steady: what reads as of a tool without separate blows is added to it: {begins: lasts}, ns.
 
     Raises:
         InputError: no pose anywhere; an operation that is not told.
@@ -147,7 +152,10 @@ def blows_of(
             return
         if stream.kind == "acceleration":
             meant = _operations(task, settings.get("operation"), run.pose)
-            for jolt, peak in _jolts(run, stream.threshold, meant[0]):
+            found = _jolts(run, stream, meant[0])
+            if found is None and steady is not None:
+                steady[run.onset] = run.last - run.onset
+            for jolt, peak in found or ():
                 blow = _felt(jolt, peak, settings, meant, task, model, shapes)
                 near = blow.onset - before < 2e9 * meant[0].excitation.period
                 hit, before = hit + 1 if near else 0, blow.onset
@@ -155,8 +163,9 @@ def blows_of(
             return
         operation = _operation(task, settings.get("operation"), run.pose)
         period = operation.excitation.period
-        length = (run.last - run.onset) * 1e-9
-        hits = 1 if settings.get("trigger") == "blow" else 1 + int(length / period)
+        # A switch that is logged holds until the next sample, whose stamp may be a little off.
+        length = (run.stamps[-1] - run.onset) * 1e-9
+        hits = 1 if settings.get("trigger") == "blow" else 1 + int(length / period + 1e-3)
         if stream.kind == "poses":
             hits = (
                 operation.hits_per_rivet if length >= 0.5 * period * operation.hits_per_rivet else 0
@@ -172,28 +181,16 @@ def blows_of(
     yield from late
 
 
-def _jolts(run: Run, threshold: float, operation: Operation) -> list[tuple[Run, FloatArray]]:
-    """The blows of a run, each with the largest reading, (k,) m/s^2.
-
-    The arm's ringing and gravity hardly change while a blow lasts: they are the median of the
-    samples around, over four times as long as a blow.
-    """
-    from scipy.ndimage import median_filter
-
-    if run.stamps.size < 2:
-        return []
+def _jolts(run: Run, stream: Stream, operation: Operation) -> list[tuple[Run, FloatArray]] | None:
+    """The blows of a run, each with the largest reading, (k,) m/s^2; None: see `jolts`."""
     period = operation.excitation.period
-    length = min(4.0 * (operation.excitation.width or 0.1 * period), 0.8 * period)
-    around = max(1, round(0.5 * length * 1e9 / float(np.median(np.diff(run.stamps)))))
-    slow = median_filter(run.values, (2 * around + 1, 1), mode="nearest")
-    quick = run.values - slow
-    size = np.linalg.norm(quick, axis=1)
-    edge = np.diff((size > threshold).astype(np.int8), prepend=0, append=0)
-    found = []
-    for a, b in zip(np.flatnonzero(edge == 1), np.flatnonzero(edge == -1), strict=True):
-        own = replace(run, onset=int(run.stamps[a]), last=int(run.stamps[b - 1]))
-        found.append((own, quick[a + int(np.argmax(size[a:b]))]))
-    return found
+    width = operation.excitation.width or 0.1 * period
+    time = (run.stamps - run.stamps[0]) * 1e-9
+    found = jolts(time, run.values, stream.threshold, width, period)
+    if found is None:
+        return None
+    at = [(int(run.stamps[0]) + round(1e9 * begin), peak, cut) for begin, peak, cut in found]
+    return [(replace(run, onset=onset, last=onset, cut=cut), peak) for onset, peak, cut in at]
 
 
 def _felt(
@@ -236,8 +233,8 @@ def _corrected(
     key = (operation.name, *np.round(blow.pose / NEAR), *np.round(blow.direction, 2))
     if key not in gains and step:
         excitation, hits = operation.excitation, operation.hits_per_rivet
-        quiet = int(excitation.period / step * 1e9)
-        time = step * 1e-9 * np.arange(quiet + int(hits * excitation.period / step * 1e9))
+        quiet = int(2 * excitation.period / step * 1e9)
+        time = step * 1e-9 * np.arange(quiet + int((hits + 2) * excitation.period / step * 1e9))
         response = ModelAtPose(unscaled(model), blow.pose).tool_response(excitation, hits)
         read = np.zeros((time.size, 3))
         read[quiet:] = response.acceleration(time[: time.size - quiet], blow.direction).T
@@ -249,7 +246,7 @@ def _corrected(
         told = [
             float(peak @ per) / (blow.peak * float(per @ per))
             for run in runs(made)
-            for _, peak in _jolts(run, stream.threshold, operation)
+            for _, peak in _jolts(run, stream, operation) or ()
         ]
         gains[key] = np.array(told) if len(told) == hits else np.ones(1)
     known = gains.get(key, np.ones(1))

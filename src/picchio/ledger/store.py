@@ -13,9 +13,10 @@ from __future__ import annotations
 import hashlib
 import json
 import sqlite3
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -82,6 +83,50 @@ class Stream:
         told = [self.kind, self.columns, self.threshold.hex(), self.foot.hex(), self.settings]
         return json.dumps(told, sort_keys=True)
 
+    @property
+    def hold(self) -> int:
+        """Ns that are looked at before and after what exceeds the threshold; 0: to the foot."""
+        return int(self.settings.get("hold") or 0)
+
+    def size(self, values: FloatArray) -> FloatArray:
+        """(m,) the size of samples (m, k), whatever their direction; a trigger has a sign.
+
+        Args:
+            values: of a force, an acceleration or a trigger.
+        """
+        if self.kind in ("trigger", "poses"):
+            return values[:, 0] if values.shape[1] else np.zeros(len(values))
+        return np.linalg.norm(values, axis=1)
+
+    def active(
+        self, stamps: IndexArray, size: FloatArray, anchors: Sequence[int] = (), ends: bool = False
+    ) -> tuple[IndexArray, IndexArray]:
+        """Where what may be a blow begins and ends: a run above the foot; all within `hold` of it.
+
+        Args:
+            stamps: (m,) ns, of a piece without gaps.
+            size: (m,) of its samples.
+            anchors: ns, of samples beside the piece that exceed the threshold, or may.
+            ends: whether a run that touches an end of the piece may be one.
+
+        Returns:
+            (r,) first samples, (r,) those after the last.
+        """
+        if self.hold:
+            over = np.sort(np.append(stamps[size > self.threshold], np.array(anchors, np.int64)))
+            new = np.diff(over, prepend=over[:1] - 2 * self.hold - 1) > 2 * self.hold
+            start = np.searchsorted(stamps, over[new] - self.hold)
+            last = over[np.append(new[1:], True)] if over.size else over
+            end = np.searchsorted(stamps, last + self.hold, side="right")
+            return start[end > start], end[end > start]
+        edge = np.diff((size > self.foot).astype(np.int8), prepend=0, append=0)
+        start, end = np.flatnonzero(edge == 1), np.flatnonzero(edge == -1)
+        if not start.size:
+            return start, end
+        good = np.maximum.reduceat(np.where(size > self.foot, size, 0.0), start) > self.threshold
+        good |= ends & ((start == 0) | (end == size.size))
+        return start[good], end[good]
+
 
 @dataclass(frozen=True, eq=False)
 class Kept:
@@ -102,15 +147,6 @@ class Kept:
     poses: FloatArray
 
 
-def magnitude(values: FloatArray) -> FloatArray:
-    """(m,) the size of samples (m, k), whatever their direction.
-
-    Args:
-        values: of a force, an acceleration or a trigger.
-    """
-    return np.abs(values[:, 0]) if values.shape[1] == 1 else np.linalg.norm(values, axis=1)
-
-
 def pieces(stamps: IndexArray, gap: int) -> Iterator[slice]:
     """The stretches between gaps.
 
@@ -125,40 +161,65 @@ def pieces(stamps: IndexArray, gap: int) -> Iterator[slice]:
             yield slice(first, last)
 
 
-def worth_keeping(samples: Samples, stream: Stream) -> tuple[BoolArray, IndexArray, FloatArray]:
+def worth_keeping(
+    samples: Samples, stream: Stream, before: Sequence[int] = (), after: Sequence[int] = ()
+) -> tuple[BoolArray, IndexArray, FloatArray]:
     """The samples and the poses that a ledger must keep so that nothing depends on the log's ends.
 
-    Of each stretch the first and the last sample; every run of samples above the foot that exceeds
-    the threshold or touches an end of the stretch, with the sample before and after it. The pose
-    where each run begins, and while it lasts, and the first and last pose.
+    Of each stretch the first and the last sample; all that may be a blow (see `Stream.active`), or
+    be with what another log has, with the sample before and after it. The pose where each begins,
+    and while it lasts, and the first and last pose.
 
     Args:
         samples: of a log.
         stream: that it belongs to.
+        before: ns, of what exceeded the threshold last, where the log has a stretch before it.
+        after: ns, of what does so first in the stretch after it.
 
     Returns:
         (m,) which samples; (p,) ns, and (p, nv) the poses then.
     """
-    size = magnitude(samples.values)
+    size = stream.size(samples.values)
     keep = np.zeros(samples.stamps.size, dtype=bool)
     clock = samples.pose_stamps
     when: list[IndexArray] = [clock[:1], clock[-1:]]
     for piece in pieces(samples.stamps, stream.gap):
-        own = size[piece]
-        active = own > stream.foot
-        edge = np.diff(active.astype(np.int8), prepend=0, append=0)
-        start, end = np.flatnonzero(edge == 1), np.flatnonzero(edge == -1)
-        if start.size:
-            tops = np.maximum.reduceat(np.where(active, own, 0.0), start)
-            good = (tops > stream.threshold) | (start == 0) | (end == own.size)
-            here, stamps = keep[piece], samples.stamps[piece]
-            for a, b in zip(start[good], end[good], strict=True):
-                here[max(a - 1, 0) : b + 1] = True
-                when.append(np.arange(stamps[a], stamps[b - 1] + 1, MARGIN))
+        here, stamps = keep[piece], samples.stamps[piece]
+        inner = piece.start > 0, piece.stop < keep.size
+        anchors = [*([stamps[0]] if inner[0] else before), *([stamps[-1]] if inner[1] else after)]
+        for a, b in zip(*stream.active(stamps, size[piece], anchors, ends=True), strict=True):
+            here[max(a - 1, 0) : b + 1] = True
+            when.append(np.arange(stamps[a], stamps[b - 1] + 1, MARGIN))
         keep[piece.start] = keep[piece.stop - 1] = True
     told = np.unique(np.concatenate(when))
     at = np.searchsorted(clock, told, side="right") - 1
     return keep, told[at >= 0], samples.poses[at[at >= 0]]
+
+
+def _beside(
+    stretches: Iterable[Samples], stream: Stream
+) -> Iterator[tuple[Samples, list[int], list[int]]]:
+    """Each stretch, what exceeds the threshold last before it, and first after it, ns.
+
+    At an end of the log, and at a gap, that is the end itself: another log may go on there.
+    """
+    last: list[int] = []
+    held: tuple[Samples, list[int]] | None = None
+    for samples in stretches:
+        over = samples.stamps[stream.size(samples.values) > stream.threshold]
+        begin, end = samples.stamps[:1].tolist(), samples.stamps[-1:].tolist()
+        if held is not None:
+            till = held[0].stamps[-1:].tolist()
+            near = not begin or not till or begin[0] - till[0] <= stream.gap
+            yield (*held, over[:1].tolist() if near else till)
+            last = last if near else begin
+        else:
+            last = begin
+        held = samples, last
+        last = over[-1:].tolist() or last
+        stop = end
+    if held is not None:
+        yield (*held, stop)
 
 
 class _Union:
@@ -177,6 +238,7 @@ class _Union:
             ).fetchall()
         self._rows = np.array([*sorted(rows), (_NEVER, 0)])
         columns = 0 if table == "pose" else stream.columns
+        self._size = stream.size if columns else partial(np.linalg.norm, axis=1)
         self.stamps, self.values = np.empty(0, np.int64), np.empty((0, columns))
 
     @property
@@ -203,7 +265,7 @@ class _Union:
             return
         when, what = np.concatenate(stamps), np.concatenate([v for v in values if len(v)])
         # Two logs that disagree at a stamp: the larger sample, whichever came first.
-        order = np.lexsort((*what.T, magnitude(what), when))
+        order = np.lexsort((*what.T, self._size(what), when))
         when, what = when[order], what[order]
         once = np.append(np.diff(when) > 0, True)
         once &= (when >= self._interval[0]) & (when <= self._interval[1])
@@ -356,12 +418,12 @@ class Ledger:
             first, last, count = _NEVER, 0, 0
             detected: tuple[str, ...] = ()
             stood: Samples | None = None
-            for samples in stretches:
+            for samples, before, after in _beside(stretches, stream):
                 clock = samples.stamps if samples.stamps.size else samples.pose_stamps
                 if not clock.size:
                     continue
                 stood = samples.standing_as(stood)
-                keep, when, poses = worth_keeping(stood, stream)
+                keep, when, poses = worth_keeping(stood, stream, before, after)
                 detected = detected or samples.detected
                 count += clock.size
                 first, last = min(first, int(clock[0])), max(last, int(clock[-1]))
@@ -434,7 +496,8 @@ class Ledger:
             ended = held.begin == _NEVER
             # Another log may yet have samples from there on.
             known = held.stamps[: np.searchsorted(held.stamps, held.begin)]
-            quiet = np.flatnonzero(magnitude(held.values[: known.size]) <= stream.foot)[-1:]
+            below = stream.size(held.values[: known.size]) <= stream.foot
+            quiet = np.flatnonzero(below & (not stream.hold))[-1:]
             apart = np.flatnonzero(np.diff(known) > stream.gap)[-1:] + 1
             begin = known.size if ended else max([0, *quiet, *apart])
             if begin == 0 and not ended:

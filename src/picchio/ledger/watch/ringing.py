@@ -9,7 +9,7 @@ import numpy as np
 from picchio.campaign.channels import kinds
 from picchio.core.arrays import FloatArray
 from picchio.ledger.samples import Samples
-from picchio.ledger.store import Stream, magnitude, pieces
+from picchio.ledger.store import Stream, pieces
 from picchio.model.model import Model
 from picchio.studies.rivet.pose import ModelAtPose
 
@@ -41,7 +41,7 @@ def ring_downs(samples: Samples, stream: Stream, model: Model) -> list[tuple[str
         return []
     found: list[tuple[str, int, float]] = []
     count = 0
-    size = magnitude(samples.values)
+    size = stream.size(samples.values)
     for piece in pieces(samples.stamps, stream.gap):
         stamps = samples.stamps[piece]
         active = np.flatnonzero(size[piece] > stream.foot)
