@@ -14,10 +14,10 @@ _LIKE = 0.3
 """Of the largest blow near by: the ringing is explained to a tenth or better, and the blows of one
 tool differ by less than a factor of three."""
 _PEAKED = 4.0
-"""Kurtosis: 1.5 of a sine, 3 of noise, 2.8 to 3.3 of a turning tool; mostly 8 of trains of blows."""
+"""Kurtosis: 1.5 of a sine, 3 of noise, 2.8 to 3.3 of a turning tool; mostly 8 of blow trains."""
 _RINGS = 0.8
-"""s: down to a fifth of a blow takes 0.7 at 100 Hz and 0.5 %; what goes on for longer without a blow
-is driven, such as by a tool that turns."""
+"""s: down to a fifth of a blow takes 0.7 at 100 Hz and 0.5 %; what goes on for longer without a
+blow is driven, such as by a tool that turns."""
 
 
 def jolts(
