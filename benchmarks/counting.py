@@ -10,7 +10,7 @@ A robot that sets a rivet every 20 s; the log holds the trigger and six angles. 
 the same file is timed beside it. Each is a process of its own; what reads a log for it counts, too.
 With `--days` there are so many logs, of as many days, in one folder. With `--each` they come one
 after the other into one ledger, each counted by a process of its own and then deleted; at last all
-of them are counted anew from the ledger.
+of them are counted anew from the ledger. With `--ringing` it counts the blows of ringing mounts.
 """
 
 from __future__ import annotations
@@ -196,6 +196,25 @@ def one_by_one(folder: Path, days: int, make, rules: Path) -> None:
           f"CPU), {full[3]:.0f} MB")  # fmt: skip
 
 
+def ringing() -> None:
+    """Blows of mounts that ring, counted: the logs are those of tests/ledger/test_jolts.py."""
+    from itertools import product
+
+    sys.path[:0] = [str(Path(__file__).parents[1] / "tests" / part) for part in ("", "ledger")]
+    from test_jolts import PEAK, reading
+
+    from picchio.ledger.jolts import jolts
+
+    logs = [*product((100, 250, 500, 1000, 3000, 10_000), (0.005, 0.02, 0.1), (10, 25, 60),
+                     (1000, 5000, 51_200), (True, False))]  # fmt: skip
+    right = 0
+    for *log, square in logs:
+        time, felt, onsets, width = reading(*log, square=square)
+        found = jolts(time, felt[:, None], 0.2 * PEAK, width, 1.0 / log[2])
+        right += found is not None and len(found) == len(onsets)
+    print(f"ringing mounts: {right} of {len(logs)} logs right")
+
+
 def main() -> None:
     import picchio
 
@@ -207,7 +226,11 @@ def main() -> None:
     parser.add_argument("--bare", type=float, default=0.2, help="h of messages read barely")
     parser.add_argument("--kind", choices=tuple(READ), default="parquet")
     parser.add_argument("--folder")
+    parser.add_argument("--ringing", action="store_true", help="blows of mounts that ring")
     asked = parser.parse_args()
+    if asked.ringing:
+        ringing()
+        return
     robot = picchio.load_robot(ROBOT)
     task = picchio.load_task(robot.task_path, robot)
     names, poses = list(robot.joint_names), task.operations[0].poses

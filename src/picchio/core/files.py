@@ -60,7 +60,9 @@ def atomic_write(path: str | Path, mode: str = "w") -> Iterator[IO[Any]]:
     if target.is_dir():
         raise InputError("cannot write a file over a folder", file=path)
     with writing(path), unfinished(partial(part_of, target)) as temporary:
-        with open(temporary, mode, encoding=encoding) as stream:
+        # Names of files that are not UTF-8 may stand in a text: they are told as \udce4.
+        bad = None if encoding is None else "backslashreplace"
+        with open(temporary, mode, encoding=encoding, errors=bad) as stream:
             yield stream
         os.replace(temporary, target)
 
@@ -249,6 +251,16 @@ def sha256(path: str | Path) -> str:
     """
     with open(path, "rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def printable_name(path: str | Path) -> str:
+    r"""A file's name, or a text with one in it, as UTF-8 can write it: others are told as \xe4.
+
+    Args:
+        path: of the file; of a text all is told.
+    """
+    name = path.name if isinstance(path, Path) else path
+    return os.fsencode(name).decode("utf-8", "backslashreplace")
 
 
 def relative_name(path: str | Path, folder: Path) -> str:

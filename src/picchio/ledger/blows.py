@@ -39,6 +39,7 @@ class Blow:
         direction: (3,) unit, world.
         pose: (nv,) rad or m.
         cut: whether a log begins or ends within it.
+        samples: that lie within it; 0 where none was seen.
     """
 
     onset: int
@@ -48,6 +49,7 @@ class Blow:
     direction: FloatArray
     pose: FloatArray
     cut: bool = False
+    samples: int = 0
 
     @property
     def seen(self) -> bool:
@@ -159,8 +161,7 @@ def runs(kept: Kept) -> list[Run]:
             at = np.searchsorted(kept.pose_stamps, stamps[a], side="right") - 1
             if not len(kept.poses):
                 raise InputError("no position was logged, so that nobody knows where the robot "
-                                 "stood", key="channel",
-                                 hint="a robot that never moves: [blows] pose")  # fmt: skip
+                                 "stood", key="channel")  # fmt: skip
             found.append(
                 Run(
                     int(stamps[a]), int(stamps[b - 1]), stamps[first:last], values[first:last],
@@ -238,7 +239,8 @@ def measured(
         along = whole / np.linalg.norm(whole)
         values = run.values @ along
     time, force = shaped(run.stamps, values, run.onset, run.last)
-    return Blow(run.onset, "force", time, force, turn @ along, run.pose, run.cut)
+    within = int(((run.stamps >= run.onset) & (run.stamps <= run.last)).sum())
+    return Blow(run.onset, "force", time, force, turn @ along, run.pose, run.cut, within)
 
 
 Shape = tuple[float, FloatArray, FloatArray]

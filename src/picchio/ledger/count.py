@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import nullcontext
 from heapq import merge
 from itertools import chain, islice
 from pathlib import Path
@@ -16,9 +17,10 @@ from picchio.campaign.importing.importer import ENDINGS
 from picchio.campaign.importing.mapping import Mapping, read_mapping
 from picchio.core.arrays import IndexArray
 from picchio.core.errors import InputError, warn_user
-from picchio.core.files import sha256
+from picchio.core.files import printable_name, regular_file, sha256
 from picchio.core.processes import one_thread
 from picchio.core.provenance import provenance
+from picchio.core.unfinished import unfinished
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.ledger.blows import Blow, bursts, covered, uncovered
 from picchio.ledger.counted import Counted
@@ -27,7 +29,7 @@ from picchio.ledger.finding import blows_of, standing, stream_of
 from picchio.ledger.forecast import UNLIKELY, Worlds, typical, worlds
 from picchio.ledger.result import Count
 from picchio.ledger.samples import Samples, by_names, read_samples
-from picchio.ledger.store import MARGIN, SHIFT, Ledger, Stream
+from picchio.ledger.store import MARGIN, SHIFT, Ledger, Stream, drop_empty
 from picchio.ledger.watch.changes import Shown, find, readings_of
 from picchio.ledger.watch.drives import drives
 from picchio.ledger.watch.exchange import exchange, signature
@@ -56,6 +58,7 @@ def count(
     sn_curve: str | SNCurve | None = None,
     samples: int = 256,
     seed: int = 0,
+    hours_per_day: float | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Count:
     """Count the blows that logs show and their damage, in a ledger that remembers them.
@@ -74,6 +77,8 @@ def count(
         sn_curve: of all shafts, instead of their own.
         samples: worlds that are drawn, at most 256.
         seed: of the draws.
+        hours_per_day: h, how long the robot works a day, as the logs show it; where it is not
+            given, the calendar's pace of a day of logs and more.
         progress: called with (logs done, logs in all).
 
     Returns:
@@ -83,6 +88,9 @@ def count(
         InputError: no log that can be read, a mapping that does not fit, another robot's ledger.
         OutputError: the ledger can't be written.
     """
+    if hours_per_day is not None and not 0.0 < hours_per_day <= 24.0:
+        raise InputError("must be above 0 and at most 24 h", key="hours_per_day",
+                         value=hours_per_day)  # fmt: skip
     model = Model.of(robot)
     bare = model.robot
     curves = curves_of(bare, sn_curve)
@@ -92,7 +100,10 @@ def count(
     known: list[str] = []
     refused: list[tuple[str, str]] = []
     detected: dict[str, tuple[str, ...]] = {}
-    with Ledger(ledger, bare.name) as book:
+    new = not Path(ledger).exists()
+    # A ledger that no log came into does not stay.
+    kept = unfinished(lambda: Path(ledger), drop_empty) if new else nullcontext()
+    with kept, Ledger(ledger, bare.name) as book:
         for number, file in enumerate(files):
             assert rules is not None
             try:
@@ -100,12 +111,13 @@ def count(
             except InputError as error:
                 if len(files) == 1 or (error.key or "").startswith("blows."):
                     raise _to_map(error, file, bare, names) from None
-                refused.append((file.name, str(error)))
+                refused.append((printable_name(file), printable_name(str(error))))
                 warn_user(f"not counted: {error}")
             else:
-                (known if lines is None else added).append(file.name)
+                name = printable_name(file)
+                (known if lines is None else added).append(name)
                 if lines is not None:
-                    detected[file.name] = lines
+                    detected[name] = lines
             if progress is not None:
                 progress(number + 1, len(files))
         if files and not added and not known:
@@ -123,11 +135,12 @@ def count(
     inputs = [*bare.files, *work.files, *([rules_file] if rules_file else [])]
     notes = (*names, *_notes(counted, rules, model), *_surprises(drawn, model))
     return Count(
-        model=model, ledger=Path(ledger), logs=logs, added=tuple(added), known=tuple(known),
-        refused=tuple(refused), detected=detected, counted=counted, worlds=drawn,
+        model=model, ledger=Path(printable_name(str(ledger))), logs=logs,
+        added=tuple(added), known=tuple(known), refused=tuple(refused), detected=detected,
+        counted=counted, worlds=drawn,
         changes=tuple(change.to_dict() for change in changes),
         exchange=other, signature=signature(readings) if other is None else other.before,
-        curves=curves, notes=notes,
+        curves=curves, notes=notes, hours_per_day=hours_per_day,
         origin=provenance(inputs, seed=seed),
     )  # fmt: skip
 
@@ -181,6 +194,8 @@ def _notes(counted: Counted, rules: Mapping | None, model: Model) -> tuple[str, 
         notes.append(f"measured blows are as they are, without {', '.join(unused)}")
     if rules is not None:
         given = {to.partition(".")[2] for _, to, _, _ in rules.entries}
+        if rules.blows and rules.blows.pose is not None:
+            given |= set(robot.joint_names)
         still = [name for name in robot.joint_names if name not in given]
         if still:
             notes.append(f"not logged, taken at zero: {', '.join(still)}")
@@ -205,17 +220,18 @@ def _files(
             raise InputError("no such file or folder", file=path)
         if path.is_dir():
             files += sorted(
-                p for p in path.rglob("*") if p.suffix.lower() in ENDINGS and p.is_file()
+                p for p in path.rglob("*") if p.suffix.lower() in ENDINGS and not p.is_dir()
             )
         else:
-            files.append(path)
+            files.append(regular_file(path))
     if not files:
         raise InputError("holds no log", file=given[0], choices=ENDINGS)
     if isinstance(mapping, Mapping):
         return _unjoined(files, mapping), mapping, None, ()
     beside = given[0] / MAPPING if given[0].is_dir() else given[0].parent / MAPPING
-    if mapping is None and not beside.is_file():
-        rules, told = by_names(files[0], robot)
+    if mapping is None and not beside.exists():
+        first = next((p for p in files if p.is_file()), files[0])
+        rules, told = by_names(regular_file(first), robot)
         if rules is None:
             raise InputError("needs a mapping from the logs' series to channels: no name says "
                              "which are the joints' angles", file=files[0], key="--mapping",
@@ -269,7 +285,10 @@ def add_log(
         InputError: see `read_samples` and `stream_of`.
     """
     robot = model.robot
-    parts = [file, *(file.parent / t.file.replace("{stem}", file.stem) for t in rules.join)]
+    parts = [
+        regular_file(file),
+        *(file.parent / t.file.replace("{stem}", file.stem) for t in rules.join),
+    ]
     # A month of logs is not read again for every count: path, size and time tell that it is known.
     seen = json.dumps([
         [str(p.resolve()), p.stat().st_size, p.stat().st_mtime_ns] for p in parts if p.is_file()
@@ -288,23 +307,34 @@ def add_log(
         stretches = read_samples(file, rules, robot)
         first = standing(next(stretches), task)
         stream = book.stream(stream_of(first, rules, task, robot))
-        rest: Iterator[Samples] = (standing(part, task) for part in stretches)
+        ends: list[str] = []
+        rest = _until_cut(stretches, task, ends)
         sizes: list[int] = []
 
         def shown(part: Samples) -> Iterator[tuple[str, int, float]]:
             sizes.append(part.stamps.size)
             return chain(ring_downs(part, stream, model), temperatures(part), drives(part, model))
 
-        book.add(log, how, file.name, stream, chain([first], rest), shown, seen)
+        book.add(log, how, printable_name(file), stream, chain([first], rest), shown, seen)
     except StopIteration:
         raise InputError("is empty", file=file) from None
     except InputError as error:
         raise error if error.file is not None else error.placed(file=file) from None
     if len(sizes) == 1:
-        return first.detected
+        return (*first.detected, *ends)
     # What was told of the rate was that of the first stretch.
     lines = (line.partition(", measured from")[0] for line in first.detected)
-    return (*lines, f"{sum(sizes)} samples")
+    return (*lines, f"{sum(sizes)} samples", *ends)
+
+
+def _until_cut(stretches: Iterator[Samples], task: Task, ends: list[str]) -> Iterator[Samples]:
+    """The further stretches of a log that can be read; why it ends there is added to `ends`."""
+    try:
+        for part in stretches:
+            yield standing(part, task)
+    except InputError as error:
+        ends.append(f"read up to here: {error}")
+        warn_user(f"counted up to where it can't be read: {error}")
 
 
 def recount(book: Ledger, model: Model, curves: Sequence[SNCurve | None], task: Task) -> Counted:

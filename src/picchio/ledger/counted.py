@@ -87,6 +87,8 @@ class Counted:
         self.kinds: Counter[str] = Counter()
         self.cut = 0
         self.forgotten = 0  # places
+        # Of the blows that were seen: how many, sums of ln N, ln s and samples; of their steps.
+        self.seen_sums = np.zeros(6)
         self.steady = 0.0  # s, of a tool without separate blows
         self.first = self.last = 0  # ns, onsets
         self.stretches: list[Stretch] = []
@@ -109,11 +111,35 @@ class Counted:
             own, blows = made.alone[:, AS_LOGGED], len(burst.blows)
             self.kinds.update(blow.kind for blow in burst.blows)
             self.cut += sum(bool(blow.cut) for blow in burst.blows)
+            self._see(burst)
             row, hour = np.array([blows, 1.0, *own]), burst.onset // HOUR
             self._hours[hour] = self._hours.get(hour, 0.0) + row
             self._put(Place(burst.pose, burst.direction, blows, own))
             self._stand(Stretch(1, own, burst.onset, burst.onset, burst.start.size, own))
         self._forget()
+
+    def _see(self, burst: Burst) -> None:
+        """Add to what the blows that were seen are like."""
+        seen = [blow for blow in burst.blows if blow.seen and not blow.cut and blow.impulse]
+        size = np.array([(b.peak, abs(b.impulse) / b.peak, b.samples) for b in seen]).reshape(-1, 3)
+        step = np.diff([blow.onset for blow in seen]) * 1e-9
+        near = np.log(step[(step > 0.0) & (step < 3.0 * np.median(step))]) if step.size else step
+        logs = np.log(size[:, :2]).sum(axis=0)
+        self.seen_sums += [len(seen), *logs, size[:, 2].sum(), near.size, near.sum()]
+
+    @property
+    def usual_blow(self) -> dict[str, float | None] | None:
+        """What the blows that were seen are like, in the mean; None of none.
+
+        Returns:
+            force N; width s, impulse over force; samples in it; rate Hz, None of single ones.
+        """
+        count, force, width, samples, steps, step = self.seen_sums.tolist()
+        if not count:
+            return None
+        rate = float(np.exp(-step / steps)) if steps else None
+        return {"force": float(np.exp(force / count)), "width": float(np.exp(width / count)),
+                "samples": samples / count, "rate": rate}  # fmt: skip
 
     @property
     def told(self) -> dict[str, Any]:
@@ -121,7 +147,7 @@ class Counted:
         whole = self._sum.burst
         return {
             "first": self.first, "last": self.last, "cut": self.cut, "forgotten": self.forgotten,
-            "steady": self.steady,
+            "steady": self.steady, "seen_sums": self.seen_sums.tolist(),
             "kinds": self.kinds, "closed": whole.closed.tolist(), "alone": whole.alone.tolist(),
             "residue": [part.tolist() for part in whole.residue],
             "hours": {hour: row.tolist() for hour, row in self._hours.items()},
@@ -136,6 +162,7 @@ class Counted:
             told: as `told` gives it.
         """
         self.steady += told["steady"]
+        self.seen_sums += told["seen_sums"]
         if not told["first"]:
             return
         self.first, self.last = self.first or told["first"], told["last"]

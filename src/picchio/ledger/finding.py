@@ -213,7 +213,9 @@ def _felt(
             best = left, abs(force), operation
     assert best is not None
     blow = assumed(run, best[2], "acceleration", 1, model, shapes)[0]
-    return replace(blow, force=blow.force * (best[1] / blow.peak))
+    within = int(np.searchsorted(run.stamps, run.onset + round(1e9 * blow.time[-1])))
+    within -= int(np.searchsorted(run.stamps, run.onset))
+    return replace(blow, force=blow.force * (best[1] / blow.peak), samples=within, cut=run.cut)
 
 
 def _corrected(

@@ -10,7 +10,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from picchio.core.errors import InputError, PicchioError
+from picchio.core.errors import InputError, OutputError, PicchioError
+from picchio.core.files import printable_name
 from picchio.core.html import sheet
 from picchio.core.provenance import provenance
 from picchio.core.results import TableResult
@@ -36,6 +37,7 @@ class _Job:
     ledgers: Path
     sn_curve: str | SNCurve | None
     seed: int
+    hours_per_day: float | None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -46,6 +48,7 @@ class Fleet(TableResult):
         robot: their type.
         robots: a summary each, the one with the most damage first.
         origin: provenance.
+        failed: of the first robot whose ledger could not be written, if any.
     """
 
     UNITS: ClassVar[dict[str, str]] = {"damage": "1", "blows_left_p50": "1"}
@@ -53,6 +56,19 @@ class Fleet(TableResult):
     robot: str
     robots: tuple[dict[str, Any], ...]
     origin: dict[str, Any]
+    failed: OutputError | None = None
+
+    def require_counted(self) -> None:
+        """Raise where a ledger could not be written, or nothing was counted.
+
+        Raises:
+            OutputError: as it was met.
+            InputError: no robot could be counted.
+        """
+        if self.failed is not None:
+            raise self.failed
+        if all(row["error"] for row in self.robots):
+            raise InputError(f"no robot could be counted: {self.robots[0]['error']}")
 
     def _headline(self) -> str:
         bad = sum(row["error"] is not None for row in self.robots)
@@ -100,6 +116,7 @@ def count_fleet(
     task: Task | str | Path | None = None,
     sn_curve: str | SNCurve | None = None,
     seed: int = 0,
+    hours_per_day: float | None = None,
     workers: int | None = 1,
     scheduler: str | None = None,
     progress: Callable[[int, int], None] | None = None,
@@ -116,6 +133,7 @@ def count_fleet(
         task: as of `count`, like the rest.
         sn_curve: of all shafts.
         seed: of the draws.
+        hours_per_day: h, that each robot works.
         workers: processes of a dask cluster of our own; 1 for none.
         scheduler: address of a dask scheduler, whose workers see the same files.
         progress: called with (robots done, robots in all).
@@ -138,16 +156,17 @@ def count_fleet(
     shared = Path(mapping) if mapping is not None else None
     if shared is None and (folder / MAPPING).is_file():
         shared = folder / MAPPING
-    job = _Job(robot, work, shared, books, sn_curve, seed)
+    job = _Job(robot, work, shared, books, sn_curve, seed, hours_per_day)
     found = []
     for row in _spread(job, [folder / name for name in names], workers, scheduler):
         found.append(row)
         if progress is not None:
             progress(len(found), len(names))
     _told_apart(found)
+    failed = [error for row in found if (error := row.pop("_failed")) is not None]
     found.sort(key=lambda row: (-(row["damage"] or 0.0), row["name"]))
     inputs = [*robot.files, *work.files, *([shared] if shared else [])]
-    return Fleet(robot.name, tuple(found), provenance(inputs, seed=seed))
+    return Fleet(robot.name, tuple(found), provenance(inputs, seed=seed), *failed[:1])
 
 
 def _spread(
@@ -170,13 +189,15 @@ def _row(job: _Job, folder: Path) -> dict[str, Any]:
         ("logs", "blows", "seen_share", "joint", "damage", "damage_interval", "blows_left", "date",
          "error")
     )  # fmt: skip
-    row |= {"name": folder.name, "changes": [], "refused": [], "another_robot": None,
-            "_exchange": None, "_signature": {}}  # fmt: skip
+    row |= {"name": printable_name(folder), "changes": [], "refused": [], "another_robot": None,
+            "_exchange": None, "_signature": {}, "_failed": None}  # fmt: skip
     try:
         found = count(job.robot, folder, job.ledgers / f"{folder.name}{ENDING}", mapping=mapping,
-                      task=job.task, sn_curve=job.sn_curve, seed=job.seed)  # fmt: skip
+                      task=job.task, sn_curve=job.sn_curve, seed=job.seed,
+                      hours_per_day=job.hours_per_day)  # fmt: skip
     except PicchioError as error:
-        return row | {"error": str(error)}
+        failed = error if isinstance(error, OutputError) else None
+        return row | {"error": printable_name(str(error)), "_failed": failed}
     return row | _summary(found)
 
 

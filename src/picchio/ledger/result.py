@@ -79,6 +79,7 @@ class Count(TableResult):
         curves: of the flexible joints.
         notes: what was taken for granted.
         origin: provenance.
+        hours_per_day: h, that the robot works, where that was stated.
     """
 
     INDEX = "name"
@@ -100,6 +101,7 @@ class Count(TableResult):
     curves: tuple[SNCurve | None, ...]
     notes: tuple[str, ...]
     origin: dict[str, Any]
+    hours_per_day: float | None = None
 
     @property
     def blows(self) -> int:
@@ -123,14 +125,38 @@ class Count(TableResult):
         return f"{self.hours:.4g} h" if self.hours >= 1.0 else f"{60.0 * self.hours:.3g} min"
 
     @property
-    def blows_a_day(self) -> float:
-        """Today's pace: over the last 28 days, or as many as there are; 0 of no blow."""
+    def blows_per_hour(self) -> float:
+        """Of logged time, over the last 28 days; 0 of no blow."""
         if not self.blows:
             return 0.0
+        hour, table = self.counted.hours
+        lately = int(hour[-1]) - 24 * _LATELY
+        spans = np.maximum(self.counted.spans, (lately + 1) * HOUR)
+        logged = float((spans[:, 1] - spans[:, 0]).sum()) / HOUR
+        return float(table[hour > lately, 0].sum()) / max(logged, 1.0 / 3600.0)
+
+    @property
+    def blows_a_day(self) -> float | None:
+        """Today's pace: by the stated hours a day, or over the last 28 days of the calendar.
+
+        None where less than a day was logged and nobody says how long the robot works.
+        """
+        if self.hours_per_day is not None or not self.blows:
+            return self.blows_per_hour * (self.hours_per_day or 0.0)
+        if self.hours < 24.0:
+            return None
         span = (self.counted.last - self.counted.first) / 1e9 / SECONDS_A_DAY
         hour, table = self.counted.hours
         lately = hour > hour[-1] - 24 * _LATELY
         return float(table[lately, 0].sum() / min(max(span, 1.0), _LATELY))
+
+    @property
+    def pace(self) -> str:
+        """The same, for people."""
+        if self.blows_a_day is None:
+            return f"{self.blows_per_hour:.4g} blows an hour of work"
+        stated = f" of {self.hours_per_day:g} h" if self.hours_per_day is not None else ""
+        return f"{self.blows_a_day:.4g} blows a day{stated}"
 
     def left(self, joint: int) -> dict[str, float] | None:
         """P10, P50 and P90 of the blows until a joint's sum is one.
@@ -168,11 +194,14 @@ class Count(TableResult):
             left: as `left` gives it.
 
         Returns:
-            such as "2041-07"; None without end.
+            such as "2041-07", or hours of work where nobody says how many a day has; None without
+            end.
         """
         if left is None or not math.isfinite(left["p50"]):
             return None
         date = self.dates(left)["p50"]
+        if self.blows_a_day is None:
+            return f"{format_count(left['p50'] / self.blows_per_hour)} h of work"
         return "> 100 y" if date is None else date.rpartition("-")[0]
 
     @property
@@ -269,6 +298,10 @@ class Count(TableResult):
             "from": _iso(self.counted.first) if self.blows else None,
             "to": _iso(self.counted.last) if self.blows else None,
             "blows_a_day": self.blows_a_day,
+            "blows_per_hour": self.blows_per_hour,
+            "hours_per_day": self.hours_per_day,
+            "usual_blow": self.counted.usual_blow,
+            "seconds_without_separate_blows": self.counted.steady,
             "joints": self.joints(),
             "ends": None if first is None else self.model.robot.flexible_names[first],
             "force_10_percent_less": dict(

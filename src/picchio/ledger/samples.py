@@ -26,6 +26,7 @@ KINDS = ("force", "acceleration", "trigger", "poses")
 BLOCK = 1 << 16
 """Samples that are held at a time of a log that can be read in blocks."""
 _OWN_CLOCKS = ("mcap", "bag")  # a topic may have no message for a while
+FIXED = "a robot that never moves: [blows] pose"
 STEPS = 5.0
 """Of the usual step: a longer one is a gap."""
 
@@ -222,10 +223,18 @@ class _Plan:
         for kind, found in self.seen.items():
             sensor = max(to.rpartition(".")[0] for to in found)  # one is enough
             self.seen[kind] = sorted(to for to in found if to.rpartition(".")[0] == sensor)
+        fixed = mapping.blows.pose if mapping.blows else None
+        if fixed is not None and len(fixed) != len(names):
+            raise InputError("must have a number for each joint", key="blows.pose", value=fixed,
+                             choices=names)  # fmt: skip
+        self.fixed = None if fixed is None else np.array(fixed)
         self.kind = next((kind for kind in KINDS if self.seen.get(kind)), "poses")
         if self.kind == "poses" and not self.poses:
             raise InputError("maps no force, acceleration, trigger or position, so that nothing "
                              "can be counted", key="channel")  # fmt: skip
+        if not self.poses and self.fixed is None:
+            raise InputError("no position was logged, so that nobody knows where the robot stood",
+                             key="channel", hint=FIXED)  # fmt: skip
         self.missing = [n for n in names if n not in {p.partition(".")[2] for p in self.poses}]
 
     def _at_tool(self, key: str, rest: str) -> bool:
@@ -262,7 +271,10 @@ class _Plan:
             table = whole
         at, rows = self._together(tuple(self.poses), values)
         self.last |= {n: (s[-1:], v[-1:]) for n, (s, v) in values.items() if s.size}
+        if self.fixed is not None and not self.poses:
+            at, rows = stamps[:1], np.empty((len(stamps[:1]), 0))
         poses = np.zeros((at.size, len(self.robot.joint_names)))
+        poses += 0.0 if self.fixed is None else self.fixed
         poses[:, list(self.poses.values())] = rows
         used = {*names, *self.poses}
         others = {n: v for n, v in values.items() if n not in used}

@@ -14,7 +14,7 @@ import hashlib
 import json
 import sqlite3
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -274,6 +274,28 @@ class _Union:
     def drop(self, count: int) -> None:
         """Forget the first samples."""
         self.stamps, self.values = self.stamps[count:].copy(), self.values[count:].copy()
+
+
+def drop_empty(path: Path) -> None:
+    """Delete a ledger without logs, with what SQLite has beside it.
+
+    Args:
+        path: its file, which need not be there.
+    """
+    beside = [path.with_name(path.name + ending) for ending in ("-wal", "-shm", "-journal")]
+    if not path.is_file():
+        return
+    # On a full disk SQLite can't make what it shares with others, and needs it for them alone.
+    alone = not (beside[0].exists() and beside[0].stat().st_size)
+    try:
+        how = f"{path.absolute().as_uri()}?mode=ro{'&immutable=1' * alone}"
+        with closing(sqlite3.connect(how, uri=True)) as base:
+            tables = base.execute("SELECT name FROM sqlite_master WHERE name = 'log'").fetchall()
+            held = bool(tables and base.execute("SELECT id FROM log LIMIT 1").fetchall())
+    except sqlite3.DatabaseError:
+        held = path.stat().st_size > 0
+    for each in [] if held else [path, *beside]:
+        each.unlink(missing_ok=True)
 
 
 class Ledger:

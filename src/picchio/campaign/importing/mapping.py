@@ -196,6 +196,7 @@ class BlowsTable(StrictModel):
         trigger: the channel `trigger` is above the threshold while the tool works ("on"), or
             passes it at each blow ("blow").
         operation: of the task: whose blows are assumed where none are seen.
+        pose: rad or m, of the robot's joints in their order, where the log has no angles.
     """
 
     threshold: Positive | None = None
@@ -204,6 +205,7 @@ class BlowsTable(StrictModel):
     frame: Literal["tool", "world"] = "tool"
     trigger: Literal["on", "blow"] = "on"
     operation: str | None = None
+    pose: list[Finite] | None = None
 
 
 class Mapping(StrictModel):

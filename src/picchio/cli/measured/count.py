@@ -28,6 +28,7 @@ from picchio.cli.output import (
     deliver,
     notice_first,
     progress,
+    say_warning,
     styled,
     table,
     to_write,
@@ -78,6 +79,12 @@ def count(
     every: Annotated[
         float, typer.Option(metavar="S", min=0.1, help="How often --watch looks, s.")
     ] = 10.0,
+    hours_per_day: Annotated[
+        float | None,
+        typer.Option(
+            metavar="H", help="How long the robot works a day, h: with it, dates follow from hours."
+        ),
+    ] = None,
     fleet: Annotated[
         bool,
         typer.Option(
@@ -124,32 +131,40 @@ def count(
 
         with progress("robots") as tick:
             rows = count_fleet(loaded, log[0], ledger, mapping=mapping, task=task,
-                               sn_curve=sn_curve, seed=seed, workers=workers, scheduler=scheduler,
-                               progress=tick)  # fmt: skip
+                               sn_curve=sn_curve, seed=seed, hours_per_day=hours_per_day,
+                               workers=workers, scheduler=scheduler, progress=tick)  # fmt: skip
         write_report(rows, report)
         deliver(rows.to_dict(), json, lambda: _show_fleet(rows))
+        rows.require_counted()
         return
     to_write(ledger, "--ledger", added_to=True)
     before: list[tuple[str, int, int]] | None = None
     while True:
         now = _listing(log or [])
         if now != before:
-            with progress("logs") as tick:
-                found = picchio.count(loaded, log or None, ledger, mapping=mapping, task=task,
-                                      sn_curve=sn_curve, seed=seed, progress=tick)  # fmt: skip
-            if prometheus is not None:
-                write_prometheus(found, prometheus)
-            if mcap is not None:
-                write_diagnostics(found, mcap)
-            write_report(found, report)
-
-            def show(found: Count = found) -> None:
-                if notice := estimate_notice(loaded.name, loaded.origins):
-                    console().print(f"{notice}.\n", style="bold yellow")
-                _show(found)
-
-            deliver(found.to_dict(arrays=True), json, show)
             before = now
+            try:
+                with progress("logs") as tick:
+                    found = picchio.count(loaded, log or None, ledger, mapping=mapping, task=task,
+                                          sn_curve=sn_curve, seed=seed,
+                                          hours_per_day=hours_per_day, progress=tick)  # fmt: skip
+            except InputError as error:
+                if not watch or not _in_any(error.file, log or []):
+                    raise
+                say_warning(f"nothing is counted yet: {error}")  # it may be written just now
+            else:
+                if prometheus is not None:
+                    write_prometheus(found, prometheus)
+                if mcap is not None:
+                    write_diagnostics(found, mcap)
+                write_report(found, report)
+
+                def show(found: Count = found) -> None:
+                    if notice := estimate_notice(loaded.name, loaded.origins):
+                        console().print(f"{notice}.\n", style="bold yellow")
+                    _show(found)
+
+                deliver(found.to_dict(arrays=True), json, show)
         if not watch:
             return
         time.sleep(every)
@@ -177,6 +192,14 @@ def _show_fleet(found: Fleet) -> None:
             out.print(styled(f"another robot? {row['name']}", f": {row['another_robot']['words']}"))
         for change in row["changes"]:
             out.print(styled(f"changed: {row['name']}", f": {change['words']}"))
+
+
+def _in_any(file: str | Path | None, logs: list[Path]) -> bool:
+    """Whether a file is one of the logs, or lies in a folder of them."""
+    if file is None:
+        return False
+    found = Path(file).resolve()
+    return any(found == log.resolve() or log.resolve() in found.parents for log in logs)
 
 
 def _listing(logs: list[Path]) -> list[tuple[str, int, int]]:
@@ -215,6 +238,11 @@ def _show(found: Count) -> None:
             ),
         )
     )
+    if blow := found.counted.usual_blow:
+        rate = "" if blow["rate"] is None else f", {blow['rate']:.3g} a second"
+        force, width, samples = (blow[key] or 0.0 for key in ("force", "width", "samples"))
+        wide = f"{1e3 * width:.3g} ms wide ({samples:.3g} samples)"
+        out.print(f"Blows as seen: {force:.4g} N, {wide}{rate}, in the mean.")
     rows = []
     for joint in found.joints():
         left = joint["blows_left"]
@@ -231,7 +259,9 @@ def _show(found: Count) -> None:
         name = found.model.robot.flexible_names[end]
         gain = float(found.if_force(0.9)[end])
         longer = f" With blows 10 % weaker it would last {gain:.3g} times as long."
-        out.print(f"{name} ends the life, at {found.blows_a_day:.4g} blows a day.{longer}")
+        out.print(f"{name} ends the life, at {found.pace}.{longer}")
+        if found.blows_a_day is None:
+            out.print("Less than a day was logged: --hours-per-day H gives dates.")
     elif found.blows:
         out.print("No life has an end: no blow damages a shaft or a drive.")
     places = found.stations()

@@ -9,7 +9,7 @@ import numpy as np
 
 from picchio.ledger.result import Count, told_blows, told_interval, told_share
 from picchio.visuals.plots.style import blank_figure, look, styled
-from picchio.visuals.report.page import Picture, Pictures, number, render
+from picchio.visuals.report.page import Picture, Pictures, render
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,7 +50,7 @@ def count_page(found: Count, *, command: str | None = None, warnings: Sequence[s
         ["Logs", found.logs],
         ["Blows", f"{found.blows:,}"],
         ["Seen, the others assumed", f"{100 * found.seen_share:.4g} %"],
-        ["Blows a day, lately", number(found.blows_a_day)],
+        ["Pace, lately", found.pace],
         ["Logged", found.logged],
     ]
     if first is not None:
