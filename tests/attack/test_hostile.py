@@ -131,7 +131,7 @@ CASES = {
         {"p.csv": POINTS + f"{LONG},1,1\n"},
     ),
     "points-cr": Case(
-        f"map {ARM} --points p.csv --out m.nc", ("p.csv", "line 2"),
+        f"map {ARM} --points p.csv --out m.nc", ("p.csv", "must name one column"),
         {"p.csv": POINTS.replace("1.0,0.0", "1.0,0\r.0")},
     ),
     "import-cell": imported(rows() + f"{LONG},1\n", "r.csv", "line 52"),
