@@ -168,3 +168,23 @@ def test_nothing_shipped_is_impossible(name):
         warnings.simplefilter("ignore", PicchioWarning)
         robot = load_robot(name)
     assert [f for f in robot.findings if f.severity == "impossible"] == []
+
+
+@pytest.mark.parametrize("count", [33, 100, 200])
+def test_a_very_long_arm_is_told_at_once(write, count):
+    parts = ['<robot name="snake"><link name="l0"/>']
+    for k in range(1, count + 1):
+        parts.append(
+            f'<joint name="j{k}" type="revolute"><parent link="l{k - 1}"/><child link="l{k}"/>'
+            f'<origin xyz="0 0 {2 / count}"/><axis xyz="{TURNS[k % 6]}"/><limit lower="-1" '
+            f'upper="1" effort="9" velocity="1"/></joint><link name="l{k}"><inertial><origin '
+            f'xyz="0 0 {1 / count}"/><mass value="{20 / count}"/><inertia ixx="1e-4" ixy="0" '
+            'ixz="0" iyy="1e-4" iyz="0" izz="1e-4"/></inertial></link>'
+        )
+    snake = write("snake.urdf", "".join(parts) + "</robot>")
+    for values in (None, {f"j{k}": {"stiffness": 1e4} for k in range(1, count + 1)}):
+        with pytest.raises(InputError, match=f"{count} joints would be flexible, and at most 32"):
+            load_robot(snake, values=values)
+    # The message's way out works.
+    some = load_robot(snake, values={f"j{k}": {"stiffness": 1e4} for k in (1, 5, 30)})
+    assert np.isfinite(some.state([0.1] * count).mass_matrix).all()

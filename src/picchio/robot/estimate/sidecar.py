@@ -19,7 +19,7 @@ from picchio.robot.drives.strength import slide_strength
 from picchio.robot.estimate.masses import SPREAD, estimated_masses, weighted
 from picchio.robot.joint import Strength
 from picchio.robot.link import LinkEntry
-from picchio.robot.masses.check import WAYS_OUT, carrying
+from picchio.robot.masses.check import WAYS_OUT, carrying, check_count
 from picchio.robot.spread import Posterior
 from picchio.robot.tool import Tool
 
@@ -56,6 +56,8 @@ def estimated_sidecar(
     Raises:
         InputError: as `drive_priors`; the URDF's masses leave no joint any to move.
     """
+    arm = robot.tree.chain(robot.tool_frame)
+    check_count(robot, sum(joint.name in robot.joint_names for joint in arm))
     links = estimated_masses(robot)
     robot = weighted(robot, links)
     priors = drive_priors(

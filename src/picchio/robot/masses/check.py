@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 # Reflected inertia below this, kg m^2 (a 1 mg body at 1 mm has 1e-12), is none.
 _LEAST_INERTIA = 1e-13
 _LEAST_EIGENVALUE = 1e-9
+# Snake arms have some 24; an assessment takes a minute at 30 and grows with the square and more.
+_MOST_FLEXIBLE = 32
 WAYS_OUT = (
     "give masses in the sidecar, [link.NAME] mass, com, inertia or [links] total_mass, or leave "
     "the joint rigid"
@@ -30,11 +32,12 @@ def check_masses(robot: FlexibleRobot) -> None:
         robot: as it was loaded.
 
     Raises:
-        InputError: a body with an impossible inertia beyond a flexible joint; a flexible joint
-            that carries no mass, or none off its axis; no mass but the tool's; a singular mass
-            matrix.
+        InputError: too many; a body with an impossible inertia beyond a flexible joint; a flexible
+            joint that carries no mass, or none off its axis; no mass but the tool's; a singular
+            mass matrix.
     """
     file = robot.source
+    check_count(robot, len(robot.flexible_joints))
     for joint in robot.flexible_joints:
         if joint.name not in robot.tree.joints:
             continue
@@ -47,6 +50,25 @@ def check_masses(robot: FlexibleRobot) -> None:
         _check_carried(robot, joint.name)
     _check_own_masses(robot)
     _check_mass_matrix(robot)
+
+
+def check_count(robot: FlexibleRobot, joints: int) -> None:
+    """Refuse more flexible joints than can be answered for in a minute or two.
+
+    Args:
+        robot: whose they are.
+        joints: how many there are, or would be.
+
+    Raises:
+        InputError: there are more.
+    """
+    if joints > _MOST_FLEXIBLE:
+        raise InputError(
+            f"{joints} joints would be flexible, and at most {_MOST_FLEXIBLE} are solved together",
+            file=robot.source, key="joint",
+            hint="give a sidecar (--flex FILE) with the stiffness of those that yield most; the "
+            "others stay rigid",
+        )  # fmt: skip
 
 
 def moving_links(robot: FlexibleRobot) -> list[str]:
