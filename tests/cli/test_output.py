@@ -72,7 +72,8 @@ def test_every_output_of_every_command_is_awaited():
     for name, command in typer.main.get_command(app).commands.items():
         for param in command.params:
             if param.name in outputs and (name, param.name) not in NO_OUTPUTS:
-                assert param.type.__class__.__name__ == "FuncParamType", (name, param.name)
+                parser = param.type_descriptor.parameter_info.parser
+                assert parser is not None, (name, param.name)
 
 
 # `explore --model` and so on are read; the two files of `start` have names of its own.
