@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from lxml import etree
 from scipy.spatial.transform import Rotation
@@ -15,6 +16,7 @@ from picchio.robot.loading.load import load_robot
 from picchio.robot.masses.by_volume import bodies
 from picchio.robot.urdf.addresses import resolve_mesh
 from picchio.robot.urdf.shapes import origin
+from picchio.robot.urdf.tree import without_quaternions
 
 HALF = math.sqrt(0.5)
 
@@ -32,6 +34,12 @@ def test_a_quaternion_turns_as_scipys_does(four):
     np.testing.assert_allclose(
         origin(element)[:3, :3], Rotation.from_quat(four).as_matrix(), atol=1e-9
     )
+
+
+def test_pinocchio_is_given_what_it_reads(arm_text):
+    root = etree.fromstring(arm_text.replace('rpy="0 0 0.4"', 'quat_xyzw="0 0.6 0 0.8"').encode())
+    read = pin.buildModelFromXML(without_quaternions(root)).jointPlacements[2].rotation
+    np.testing.assert_allclose(read, Rotation.from_quat([0, 0.6, 0, 0.8]).as_matrix(), atol=1e-12)
 
 
 def test_an_arm_written_with_quaternions_is_the_same_arm(arm_text, write, flex):

@@ -292,6 +292,23 @@ def read_origin(element: etree._Element) -> tuple[Vector, Vector]:
     return ZERO, ZERO
 
 
+def without_quaternions(root: etree._Element) -> str:
+    """The URDF with roll, pitch and yaw in place of quaternions, for readers of URDF 1.0.
+
+    Args:
+        root: of the URDF; changed in place.
+
+    Raises:
+        InputError: as `read_origin`.
+    """
+    for element in root.iter("origin"):
+        owner = element.getparent()
+        if owner is not None and element.get("quat_xyzw") is not None:
+            element.set("rpy", " ".join(map(repr, read_origin(owner)[1])))
+            del element.attrib["quat_xyzw"]
+    return etree.tostring(root, encoding="unicode")
+
+
 def _end(element: etree._Element, tag: str) -> str:
     found = children(element, tag)
     link = found[0].get("link") if len(found) == 1 else None

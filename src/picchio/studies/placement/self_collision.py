@@ -12,6 +12,8 @@ from picchio.core.arrays import FloatArray
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.ik.chain import tool_chain
 from picchio.robot.urdf.addresses import package_roots
+from picchio.robot.urdf.tree import without_quaternions
+from picchio.robot.urdf.xml import parse_urdf, read_urdf_bytes
 
 _SAMPLES = 100
 # Pairs that touch in nearly all poses are drawn to touch (MoveIt's assistant takes 95 %).
@@ -34,12 +36,16 @@ class SelfCollision:
             robot: whose URDF is read.
             rest: (nv,) where joints stand that do not move the tool, such as fingers.
         """
+        root = parse_urdf(read_urdf_bytes(robot.source), robot.source)
+        if root.find("link/collision/geometry/capsule") is not None:
+            return "the URDF's collision shapes have capsules, which are not looked at"
+        text = without_quaternions(root)
+        folders = [str(folder) for folder in (*package_roots(), robot.source.parent)]
         try:
-            model = pin.buildModelFromUrdf(str(robot.source))
-            geometry = pin.buildGeomFromUrdf(
-                model, str(robot.source), pin.GeometryType.COLLISION,
-                package_dirs=[str(root) for root in (*package_roots(), robot.source.parent)],
-            )  # fmt: skip
+            model = pin.buildModelFromXML(text)
+            geometry = pin.buildGeomFromUrdfString(
+                model, text, pin.GeometryType.COLLISION, None, folders
+            )
         except (ValueError, RuntimeError) as error:
             return f"the collision meshes cannot be loaded ({' '.join(str(error).split())[:120]})"
         if geometry.ngeoms < 2:
