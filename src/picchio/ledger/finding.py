@@ -163,9 +163,8 @@ def blows_of(
             return
         operation = _operation(task, settings.get("operation"), run.pose)
         period = operation.excitation.period
-        # A switch that is logged holds until the next sample, whose stamp may be a little off.
-        length = (run.stamps[-1] - run.onset) * 1e-9
-        hits = 1 if settings.get("trigger") == "blow" else 1 + int(length / period + 1e-3)
+        length = (run.last - run.onset) * 1e-9
+        hits = 1 if settings.get("trigger") == "blow" else 1 + int(length / period)
         if stream.kind == "poses":
             hits = (
                 operation.hits_per_rivet if length >= 0.5 * period * operation.hits_per_rivet else 0
