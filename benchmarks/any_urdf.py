@@ -7,8 +7,10 @@ Each is loaded and assessed on the default task in a process of its own, so that
 and not suffered. Where several frames could carry the tool (two arms, legs, wheels, fingers),
 picchio asks for `--tool`: such files are counted apart, with the first frame that it names. Files
 of the same bytes count once. Printed: how many loaded, how many of those got an interval, the
-slowest, and why the others were refused. No URDF is part of picchio: a good folder is the data set
-of Tola and Corke, "Understanding URDF: a dataset and analysis"
+slowest, and why the others were refused; how many joints that can move are in no answer and not
+named, and how many answers change with the number that stands at every effort limit (`--efforts`:
+10, 100 and 1000, and what enters the answer must be the same). No URDF is part of picchio: a good
+folder is the data set of Tola and Corke, "Understanding URDF: a dataset and analysis"
 (github.com/Daniella1/urdf_files_dataset).
 """
 
@@ -20,21 +22,54 @@ import math
 import multiprocessing
 import random
 import re
+import tempfile
 import time
 import warnings
 from collections import Counter, defaultdict
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import picchio
 from picchio.core.errors import InputError
 from picchio.robot.loading.catalogue import shipped_robots
+from picchio.robot.urdf.tree import LOCKED, MOVABLE
+from picchio.studies.default_task import default_task
 
 LIMIT = 10.0
 """s of one core that an answer may take, importing what is needed not counted."""
 
 
-def answer(robot: str, end: Any) -> None:
+EFFORTS = (10, 100, 1000)
+"""N m, limits that people fill in where they know none."""
+
+
+def with_efforts(urdf: Path, folder: str, effort: int) -> Path:
+    """A copy of a URDF with one effort limit at every joint."""
+    text = urdf.read_bytes()
+    copy = Path(folder) / f"{urdf.stem}-{effort}.urdf"
+    copy.write_bytes(
+        re.sub(rb"(?<![\w:])effort\s*=\s*([\"'])[^\"']*\1", b'effort="%d"' % effort, text)
+    )
+    return copy
+
+
+def enters(robot: Any) -> tuple[Any, ...]:
+    """What of a robot's drives enters an answer."""
+    spreads = {name: (one.value, one.size) for name, one in robot.spreads.items()}
+    posterior = robot.posterior and (robot.posterior.names, robot.posterior.correlation)
+    return [replace(one, effort_limit=0.0) for one in robot.flexible_joints], spreads, posterior
+
+
+def flips(urdf: Path, tool: str | None) -> bool:
+    """Whether an answer depends on the number that stands at every effort limit."""
+    with tempfile.TemporaryDirectory() as folder:
+        robots = [with_efforts(urdf, folder, effort) for effort in EFFORTS]
+        tried = [enters(picchio.load_robot(robot, tool=tool)) for robot in robots]
+        return any(one != tried[0] for one in tried)
+
+
+def answer(robot: str, end: Any, asked: argparse.Namespace) -> None:
     """Load and assess one robot; what came of it goes through the pipe."""
     found: dict[str, Any] = {"step": "load"}
     began = time.process_time()
@@ -43,10 +78,17 @@ def answer(robot: str, end: Any) -> None:
         try:
             loaded = loaded_with_a_tool(robot, found)
             found |= {"step": "assess", "joints": len(loaded.flexible_joints)}
-            life = picchio.assess(loaded)
-            ends = life.uncertainty and life.uncertainty.utilisation
+            life = picchio.assess(loaded, default_task(loaded), uncertainty=not asked.quick)
+            ends = life.uncertainty.utilisation if life.uncertainty else {}
             found["interval"] = bool(ends) and 0.0 < ends["p10"] < ends["p90"] < math.inf
             found |= {"step": "answer", "verdict": life.verdict.status}
+            told = {gap.joint for gap in life.verdict.not_assessed if gap.part == "joint"}
+            moving = {j.name for j in loaded.tree.joints.values() if j.type in (*MOVABLE, *LOCKED)}
+            found["unnamed"] = sorted(moving - told - {joint.name for joint in life.joints})
+            out = any(one.moves_tool for one in life.left_out)
+            found["safe_over_a_gap"] = out and life.verdict.status == "safe"
+            if asked.efforts:
+                found["flipped"] = flips(loaded.source, found.get("tool"))
         except InputError as error:
             found["why"] = str(error)
         except Exception as error:
@@ -77,10 +119,12 @@ def warm_up() -> None:
     import picchio.studies.uncertainty.sampler  # noqa: F401
 
 
-def ask(robot: str) -> dict[str, Any]:
+def ask(robot: str, asked: argparse.Namespace) -> dict[str, Any]:
     """The answer, or how the process that looked for it ended."""
     ours, theirs = multiprocessing.Pipe(duplex=False)
-    process = multiprocessing.get_context("fork").Process(target=answer, args=(robot, theirs))
+    process = multiprocessing.get_context("fork").Process(
+        target=answer, args=(robot, theirs, asked)
+    )
     process.start()
     theirs.close()
     found: dict[str, Any] = {"step": "load", "crash": True, "seconds": math.nan}
@@ -107,6 +151,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", help="a folder, or `shipped`")
     parser.add_argument("--most", type=int, help="so many of them, drawn; all if not given")
+    parser.add_argument("--efforts", action="store_true", help="each again with placeholders")
+    parser.add_argument("--quick", action="store_true", help="no intervals: stated values only")
     parser.add_argument("--json", type=Path, help="write every answer")
     asked = parser.parse_args()
     if asked.folder == "shipped":
@@ -121,7 +167,7 @@ def main() -> None:
     warm_up()
     all_found = {}
     for name in names:
-        all_found[name] = found = ask(name)
+        all_found[name] = found = ask(name, asked)
         print(f"{found['step']:7s} {found['seconds']:6.2f} s  {name}  {found.get('why', '')[:150]}",
               flush=True)  # fmt: skip
     asked_for = {n: f for n, f in all_found.items() if "tool" in f}
@@ -145,6 +191,13 @@ def main() -> None:
         print(f"slowest: {told[slowest]['seconds']:.1f} s, {slowest}")
     print(f"crashes: {sum(bool(f.get('crash')) for f in all_found.values())}")
     print("verdicts:", dict(Counter(f["verdict"] for f in told.values())))
+    answered = [f for f in all_found.values() if f["step"] == "answer"]
+    print(
+        f"of {len(answered)} answers: with a joint that is nowhere named "
+        f"{sum(bool(f.get('unnamed')) for f in answered)}, safe over a joint left out "
+        f"{sum(bool(f.get('safe_over_a_gap')) for f in answered)}, changed by which number stands "
+        f"at every effort limit {sum(bool(f.get('flipped')) for f in answered)}"
+    )
     for why, those in sorted(refused.items(), key=lambda one: -len(one[1])):
         print(f"{len(those):4d}  {why}   such as {Path(those[0]).name}")
     if asked.json:

@@ -40,8 +40,8 @@ if TYPE_CHECKING:
     from picchio.robot.loading.annotated import annotate as annotate
     from picchio.robot.loading.catalogue import robots as robots
     from picchio.robot.loading.load import load_robot as load_robot
+    from picchio.studies.assessment.backwards import allowable as allowable
     from picchio.studies.assessment.run import assess as assess
-    from picchio.studies.backwards import allowable as allowable
     from picchio.studies.comparison import compare as compare
     from picchio.studies.envelopes import envelope as envelope
     from picchio.studies.maps.run import workspace_map as workspace_map
@@ -60,7 +60,7 @@ if TYPE_CHECKING:
 # Every public name and its module, which is loaded when the name is first used; "" for a package.
 _HOME = {
     # What the commands do: a function each.
-    "allowable": "studies.backwards",
+    "allowable": "studies.assessment.backwards",
     "annotate": "robot.loading.annotated",
     "assess": "studies.assessment.run",
     "check": "measurement.quality.report",

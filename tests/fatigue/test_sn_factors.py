@@ -16,7 +16,7 @@ from picchio.fatigue.mean_stress import Rule, fkm_sensitivity
 from picchio.fatigue.miner import damage
 from picchio.fatigue.sn.curve import MinerRule, SNCurve
 from picchio.fatigue.sn.library import load_sn_curve
-from picchio.studies.backwards import largest_factor
+from picchio.studies.assessment.backwards import largest_factor
 
 assert pylife.materiallaws.woehlercurve  # registers the accessor used below
 

@@ -82,9 +82,7 @@ def test_a_joint_that_moves_no_mass_stays_rigid_and_is_told(tmp_path):
     robot = load_robot(path)
     assert "wrist_3_joint" not in robot.flexible_names
     assert len(robot.flexible_names) == 5
-    reasons = left_rigid(robot, robot.flexible_names)
-    assert reasons == {"joints beyond which the URDF gives no mass, or one that cannot be":
-                       ["wrist_3_joint"]}  # fmt: skip
+    assert left_rigid(robot) == (("wrist_3_joint", "moves no mass that the URDF gives", True),)
 
 
 def test_nothing_to_estimate_masses_by_is_refused(tmp_path):

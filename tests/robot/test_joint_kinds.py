@@ -127,7 +127,10 @@ def test_a_mimic_joint_moves_with_the_one_that_it_follows(write):
 def test_every_tool_frame_that_is_guessed_says_why(arm_text, write):
     values = {"a": {"stiffness": 1e4}}
     robot = load_robot(write("a.urdf", arm_text), values=values)
-    assert (robot.tool_frame, robot.origins["tool.frame"]) == ("tip", "the only place at an end")
+    assert (robot.tool_frame, robot.origins["tool.frame"]) == (
+        "tip",
+        "chosen: the only place at an end",
+    )
     two = arm_text.replace(
         "</robot>",
         '<link name="lamp"/><joint name="l" type="fixed"><parent link="upper"/>'
@@ -135,7 +138,7 @@ def test_every_tool_frame_that_is_guessed_says_why(arm_text, write):
     )
     robot = load_robot(write("b.urdf", two), values=values)  # the lamp is fixed to the arm's middle
     assert (robot.tool_frame, robot.origins["tool.frame"]) == (
-        "tip", "the only place beyond all joints"
+        "tip", "chosen: the only place beyond all joints"
     )  # fmt: skip
     hands = two.replace('name="l" type="fixed"', 'name="l" type="continuous"')
     with pytest.raises(InputError, match=r"several frames could carry the tool; valid: tip, lamp"):
@@ -155,7 +158,7 @@ def test_fingers_are_carried_by_the_arms_end(arm_text, write):
     fingers = FINGER.format("left", 0.02) + FINGER.format("right", -0.02)
     robot = load_robot(write("h.urdf", arm_text.replace("</robot>", fingers + "</robot>")))
     assert robot.tool_frame == "tip"
-    assert robot.origins["tool.frame"] == "where the arm ends and its fingers begin"
+    assert robot.origins["tool.frame"] == "chosen: where the arm ends and its fingers begin"
     assert robot.flexible_names == ("a", "b")
 
 
@@ -191,7 +194,11 @@ def test_no_warning_for_a_shipped_robot(name):
     with warnings.catch_warnings(record=True) as seen:
         warnings.simplefilter("always")
         load_robot(name)
-    assert [str(w.message) for w in seen] == []
+    # Its second joint holds 27 N m of the arm, and the URDF limits it to 22 N m.
+    wrong = ["effort limits are not believed"] if name == "talos_left_arm" else []
+    assert [part in str(w.message) for part, w in zip(wrong, seen, strict=True)] == [True] * len(
+        wrong
+    )
 
 
 def test_what_is_read_twice_is_told_once():

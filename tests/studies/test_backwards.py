@@ -14,8 +14,8 @@ from picchio.model.model import Model
 from picchio.robot.drives.reducer import all_reducers, load_reducer
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.loading.load import load_robot
+from picchio.studies.assessment.backwards import allowable
 from picchio.studies.assessment.run import assess
-from picchio.studies.backwards import allowable
 from picchio.studies.tasks import Task, task_from_dict
 
 # A thinner shaft at the same joint stiffness is meant here, and warned of.

@@ -49,6 +49,48 @@ def test_the_same_differs_in_nothing(folder):
                                                    f"{folder / 'soft.json'} (2)"]  # fmt: skip
 
 
+@pytest.mark.parametrize(
+    ("before", "after", "label", "shown"),
+    [
+        ([], [("payload", "tool", {"mass": 2.0})], "effects payload tool", ("-", "mass 2")),
+        (
+            [("backlash", "joint_1", {"gap": 1e-3})],
+            [("backlash", "joint_1", {"gap": 2e-3})],
+            "effects backlash joint_1 parameters: gap",
+            ("0.001", "0.002"),
+        ),
+        (
+            [("payload", "tool", {"mass": 2.0})],
+            [("payload", "tool", {"mass": 2.0}), ("cable", "link_3", {"k": 5.0, "c": 1.0})],
+            "effects cable link_3",
+            ("-", "k 5, c 1"),
+        ),
+        (
+            [("joint_stiffness", "joint_1", {"factor": 0.5})],
+            [("joint_stiffness", "joint_2", {"factor": 0.5})],
+            "effects joint_stiffness joint_2",
+            ("-", "factor 0.5"),
+        ),
+    ],
+)
+def test_an_effect_that_differs_is_told_with_its_numbers(before, after, label, shown):
+    def content(effects):
+        rows = [{"effect": e, "target": t, "parameters": p} for e, t, p in effects]
+        return {"format": "picchio-x/1", "inputs": {"effects": rows}}
+
+    found = picchio.compare(content(before), content(after))
+    assert (label, shown) in [(row.label, row.shown) for row in found.entered]
+
+
+def test_a_list_of_lives_is_shown_as_one():
+    def content(p10):
+        return {"format": "picchio-x/1", "sampling": {"p10": p10}}
+
+    for other in ([1.0, 3.0], None, [1.0, 2.0, 3.0, 4.0, 5.0]):
+        found = picchio.compare(content([1.0, 2.0]), content(other))
+        assert found.results[0].shown[0] == "1, 2"
+
+
 def test_robots_whose_joints_have_other_names(folder):
     """What one of them lacks is a row, not twenty; no number is made up."""
     joints = {"a": {"k": 1.0, "c": 2.0}, "b": {"k": 3}}
@@ -58,7 +100,7 @@ def test_robots_whose_joints_have_other_names(folder):
              "joints": [{"name": "b", "peak": 0.0}]}  # fmt: skip
     found = picchio.compare(ours, other)
     assert [(row.label, row.shown) for row in found.entered] == [
-        ("joint a", ("given", "-")), ("joint b: k", ("3", "4")),
+        ("joint a", ("k 1, c 2", "-")), ("joint b: k", ("3", "4")),
     ]  # fmt: skip
     assert [row.values for row in found.results] == [(1.0, None), (None, 0.0)]
     assert all(math.isnan(row.ratios[1]) for row in found.results)

@@ -1,14 +1,22 @@
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import picchio
 from picchio.core.errors import InputError
 from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.robot.loading.find import find_robot
 from picchio.robot.loading.load import load_robot
-from picchio.studies.default_task import default_poses, default_task, default_task_content
+from picchio.studies.default_task import (
+    default_poses,
+    default_task,
+    default_task_content,
+    task_of,
+)
 from picchio.studies.placement.self_collision import SelfCollision
 from picchio.studies.tasks import task_from_dict
 
@@ -79,16 +87,40 @@ def test_the_same_seed_gives_the_same_poses() -> None:
     np.testing.assert_array_equal(written, [0.16, -1.547, 1.569, -1.866, 0.437, 0.203])
 
 
-def test_blows_weigh_no_more_than_the_payload() -> None:
-    robot = arm("ur10")
-    assert default_task_content(robot)["excitation"]["force"] == 300.0
-    assert default_task_content(robot, payload=10.0)["excitation"]["force"] == 98.1
-    assert default_task_content(robot, payload=100.0)["excitation"]["force"] == 300.0
-    operation = default_task(robot, payload=10.0).operations[0]
-    assert operation.hits_per_rivet == 12
-    assert operation.excitation.peak_force == 98.1
-    with pytest.raises(InputError, match="payload: must be positive"):
-        default_task(robot, payload=-1.0)
+BLOWS = {
+    "as documented": ("bare", {}, (300.0, 0.040, 0.004, 12)),
+    "the force alone": ("bare", {"force": 500.0}, (500.0, 0.040, 0.004, 12)),
+    "all of them": (
+        "bare", {"force": 80.0, "period": 0.1, "width": 0.01, "hits": 3}, (80.0, 0.1, 0.01, 3),
+    ),
+    "the robot's example": ("fanuc_like_3dof", {}, (300.0, 0.040, 0.004, 12)),
+    "of the example, the rate and the hits": (
+        "fanuc_like_3dof", {"period": 0.05, "hits": 1}, (300.0, 0.05, 0.004, 1),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", BLOWS)
+def test_without_a_task_the_blows_are_documented_and_can_be_set(case: str) -> None:
+    name, given, (force, period, width, hits) = BLOWS[case]
+    robot = arm("ur10") if name == "bare" else arm(name)
+    robot = dataclasses.replace(robot, task_path=None) if name == "bare" else robot
+    task = task_of(robot, **given)
+    assert task.assumed
+    for operation in task.operations:
+        blows = operation.excitation
+        assert (blows.peak_force, blows.period, operation.hits_per_rivet) == (force, period, hits)
+        assert f"{1e3 * width:g} ms wide" in blows.describe()
+    with pytest.raises(InputError, match="force: belongs to an answer without a task"):
+        task_of(robot, task, force=1.0)
+
+
+@pytest.mark.parametrize("payload", [0.5, 3.0, 10.0, 300.0])
+def test_a_payload_never_sets_the_blow(payload: float, tmp_path: Path) -> None:
+    assert picchio.start("ur10", payload=payload).task["excitation"]["force"] == 300.0
+    urdf = find_robot("ur10").urdf
+    robot = picchio.load_robot(urdf, payload=payload)
+    assert {op.excitation.peak_force for op in task_of(robot).operations} == {300.0}
 
 
 def test_a_leg_and_a_single_slide_have_poses_too() -> None:

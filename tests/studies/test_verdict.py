@@ -117,9 +117,10 @@ def test_every_reason_that_lowers_trust_is_told(tmp_path):
     with pytest.warns(picchio.PicchioWarning):
         found = picchio.assess(robot, picchio.task_from_dict(work, robot))
     reasons = "\n".join(found.verdict.reasons)
-    for part in ("joint_1 is beyond its limits", "no reducer is named for joint_1, joint_3",
+    for part in ("joint_1 is beyond its limits",
+                 "reducers not checked in joint_1, joint_3: none given",
                  "joint_1: stiffness and damping are estimates", "within a factor of 2 (one",
-                 "42CrMo4-QT-shaft is unverified",
+                 "42CrMo4-QT-shaft: engineering assumption, no source",
                  "no shaft is given for joint_2", "false brinelling", "times stiffer"):  # fmt: skip
         assert part in reasons, part
     content = found.to_dict()

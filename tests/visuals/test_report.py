@@ -178,8 +178,8 @@ def test_a_scene_is_folded_in(arm: SimpleNamespace) -> None:
 
 def test_backwards_doubt_and_terms_have_their_place(arm: SimpleNamespace) -> None:
     from picchio.fatigue.uncertain_lives import LifeSpread, Uncertain
+    from picchio.studies.assessment.backwards import Allowable
     from picchio.studies.assessment.method_comparison import Term
-    from picchio.studies.backwards import Allowable
     from picchio.studies.uncertainty.result import UncertainLife
 
     spread = LifeSpread(

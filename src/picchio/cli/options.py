@@ -89,7 +89,7 @@ TaskOption = Annotated[
 ]
 PayloadOption = Annotated[
     float | None,
-    typer.Option(metavar="KG", help="Rated payload; narrows the estimates, bounds the blows."),
+    typer.Option(metavar="KG", help="Rated payload; narrows the estimates."),
 ]
 ReachOption = Annotated[
     float | None, typer.Option(metavar="M", help="Rated reach; what the URDF says if not given.")
@@ -110,7 +110,7 @@ SNCurveOption = Annotated[
     ),
 ]
 ForceOption = Annotated[
-    float | None, typer.Option(help="Height of a blow, N; the example task's if not given.")
+    float | None, typer.Option(help="Peak force of one blow, N; the example task's if not given.")
 ]
 PeriodOption = Annotated[
     float | None, typer.Option(help="Time from one blow to the next, s; likewise.")

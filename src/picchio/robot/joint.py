@@ -176,6 +176,7 @@ class Strength(StrictModel, Ratings):
         life_curve: name of a shipped torque-life curve, or a `picchio-sn-curve/1` file.
         estimated: true if the values were not read from a catalogue: a factor of 2 where no
             spread is given.
+        source: where the values come from, if not from where the joint's do.
     """
 
     repeated_peak_torque: Positive
@@ -183,6 +184,7 @@ class Strength(StrictModel, Ratings):
     momentary_peak_torque: Positive | None = None
     life_curve: Name | None = None
     estimated: bool | None = None
+    source: str | None = None
 
 
 ESTIMATED_DRIVE = "drive (estimated)"

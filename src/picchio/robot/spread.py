@@ -16,12 +16,23 @@ from pydantic import Field, create_model, model_validator
 from picchio.core.errors import InputError
 from picchio.core.toml import Finite, NotNegative, StrictModel, leaf_types
 
+ESTIMATE = "picchio's estimate"
+"""The label of the source that stands in where no file says anything."""
 ESTIMATED = 2.0
 """The factor by which an estimate without a spread of its own is uncertain."""
 
 T = TypeVar("T", bound=StrictModel)
 Factor = Annotated[float, Field(ge=1, allow_inf_nan=False, strict=True)]
 Number = float | tuple[float, ...]
+
+
+def is_estimate(origin: str) -> bool:
+    """Whether a value is picchio's own estimate, in memory or written by `picchio start`.
+
+    Args:
+        origin: of the value.
+    """
+    return ESTIMATE in origin
 
 
 def with_spreads(table: type[T]) -> type[T]:

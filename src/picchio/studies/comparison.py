@@ -26,17 +26,19 @@ from picchio.studies.assessment.run import assess
 from picchio.studies.default_task import task_of
 
 FORMAT = "picchio-comparison/1"
+_FEW = 4  # values of a table that are shown in its row
 _SAME = 1e-9  # relative: what differs by less is rounding
 _VERSION = re.compile(r"picchio-[a-z-]+/1")
 # Not results: what entered and how, prose, and what is told pose by pose.
 _LEFT_OUT = {"format", "inputs", "provenance", "operations", "origins", "assumptions", "warnings",
-             "steady_state", "method_terms", "doubts"}  # fmt: skip
+             "steady_state", "method_terms", "doubts", "tool", "not_assessed"}  # fmt: skip
 _PROSE = {"name", "source", "assumptions", "unverified", "warning"}
 _FIGURES = {
     "status", "governed_by", "joint", "margin", "rivets_to_failure", "peak_deflection",
     "peak_torque", "peak_shear_stress", "utilisation", "yield_utilisation", "reducer_utilisation",
     "reducer_governed_by", "damage_per_rivet", "p10", "p50", "p90", "margin_interval",
-    "utilisation_interval", "yield_utilisation_interval", "reducer_utilisation_interval",
+    "utilisation_interval", "yield_utilisation_interval", "reducer_utilisation_interval", "force",
+    "force_interval",
 }  # fmt: skip
 _UNITS = {
     **Assessment.UNITS, "stiffness": "N m/rad", "force": "N", "period": "s", "width": "s",
@@ -145,7 +147,8 @@ class Comparison(Result):
                 rows[row.key] = row
             elif lacking not in rows:
                 there = tuple(lacking in side for side in sides)
-                shown = tuple("given" if has else "-" for has in there)
+                shown = tuple(_short(item.content.get("inputs") or {}, lacking)
+                              for item in self.items)  # fmt: skip
                 rows[lacking] = Difference(lacking, "", there, shown, table=True)
         return tuple(rows.values())
 
@@ -284,7 +287,19 @@ def _names(sources: Sequence[str]) -> list[str]:
 
 
 def _results(content: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in content.items() if key not in _LEFT_OUT}
+    kept = {key: value for key, value in content.items() if key not in _LEFT_OUT}
+    if isinstance(verdict := kept.get("verdict"), Mapping):
+        kept["verdict"] = {key: value for key, value in verdict.items() if key not in _LEFT_OUT}
+    return kept
+
+
+def _short(content: Mapping[str, Any], table: str) -> str:
+    """The values of a small table, such as an effect's; "-" where there is none."""
+    own = {key.removeprefix(f"{table}."): value for key, value in leaves(content)
+           if key.startswith(f"{table}.")}  # fmt: skip
+    told = [f"{key.removeprefix('parameters.')} {_text(value)}" for key, value in own.items()
+            if key not in ("effect", "target")]  # fmt: skip
+    return "-" if not own else ", ".join(told) if 0 < len(told) <= _FEW else "given"
 
 
 def leaves(content: Any, before: str = "") -> Iterator[tuple[str, Any]]:
@@ -302,10 +317,20 @@ def leaves(content: Any, before: str = "") -> Iterator[tuple[str, Any]]:
             yield from leaves(value, f"{before}.{key}" if before else str(key))
     elif isinstance(content, list) and content and isinstance(content[0], Mapping):
         for k, value in enumerate(content):
-            name = value.get("name", value.get("joint", k + 1)) if isinstance(value, Mapping) else k
+            name = _name(value) or k + 1
             yield from leaves(value, f"{before}.{name}" if before else str(name))
     else:
         yield before, content
+
+
+def _name(entry: Any) -> str:
+    """What an entry of a list is called: its name or joint, or an effect and its target."""
+    if not isinstance(entry, Mapping):
+        return ""
+    keys = next(
+        (keys for keys in (["name"], ["joint"], ["effect", "target"]) if keys[0] in entry), []
+    )
+    return " ".join(str(entry[key]) for key in keys if key in entry)
 
 
 def listed(content: Mapping[str, Any]) -> tuple[Difference, ...]:
@@ -328,9 +353,11 @@ def listed(content: Mapping[str, Any]) -> tuple[Difference, ...]:
 
 
 def _branches(content: Any) -> Iterator[str]:
-    """The path of every table in the content."""
-    for path, _ in leaves(content):
+    """The path of every table in the content, empty ones included."""
+    for path, value in leaves(content):
         parts = path.split(".")
+        if value in ([], {}):
+            yield path
         yield from (".".join(parts[:k]) for k in range(1, len(parts)))
 
 
@@ -374,7 +401,7 @@ def _shown(key: str, side: Mapping[str, Any], first: Any) -> str:
     if last == "rivets_to_failure" and side.get(key.replace(last, "estimated")):
         ends = [_shown(key.replace(last, f"life.{end}"), side, None) for end in ("p10", "p90")]
         return " to ".join(ends)  # an estimate is no lone number
-    if last in ("rivets_to_failure", "p10", "p50", "p90"):
+    if last in ("rivets_to_failure", "p10", "p50", "p90") and not isinstance(value, list):
         # Null is a life without end, if there is a shaft at all.
         known = key in side and side.get(f"{before}.sn_curve", "?") != ""
         return format_count(math.inf if known and value is None else value or math.nan)

@@ -18,14 +18,14 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from picchio.core.arrays import FloatArray
-from picchio.core.errors import InputError
+from picchio.core.errors import InputError, gathered
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.ik.chain import Chain, tool_chain
-from picchio.studies.tasks import ASSUMED_BLOWS, FORMAT, Task, load_task, task_from_dict
+from picchio.studies.tasks import ASSUMED_BLOWS, FORMAT, Task, blows_of, load_task, task_from_dict
 
 POSES = 5
-FORCE, HITS = ASSUMED_BLOWS.force or 0.0, 12  # N, 1
-GRAVITY = 9.81  # m/s^2, of a payload's weight
+HITS = 12  # 1, blows of a rivet
+LIFE = 1e6  # rivets, for which the allowable force is given where nobody asks for a life
 
 _DRAWN = 4000
 _DECIMALS = 3  # of a pose, rad or m: nothing finer could differ from machine to machine
@@ -41,67 +41,82 @@ _FEW = 25  # poses that a wish must leave, or it is given up
 _SPREAD, _CLOSER = 0.5, 0.8  # of the reach, between two poses' tool points; then less and less
 
 
-def default_task(robot: FlexibleRobot, *, payload: float | None = None, seed: int = 0) -> Task:
+def default_task(robot: FlexibleRobot, *, seed: int = 0) -> Task:
     """What a robot does where nobody said: 12 blows a rivet along three axes at five poses.
 
-    Blows of 300 N, 4 ms wide, one every 40 ms; no harder than the payload's weight. The poses
-    are drawn within the limits and kept where a robot works, as far as its joints alone tell:
-    in front of it and above the plane it stands on, neither stretched nor folded, away from
-    singular poses, no part near another, the tool pointing away, spread out. A wish that this
-    robot's joints leave few poses for is given up. Joints that do not move the tool are at zero.
+    Blows of 300 N, 4 ms wide, one every 40 ms, whatever the robot: what it carries says nothing of
+    the gun. The poses are drawn within the limits and kept where a robot works, as far as its
+    joints alone tell: in front of it and above the plane it stands on, neither stretched nor
+    folded, away from singular poses, no part near another, the tool pointing away, spread out. A
+    wish that this robot's joints leave few poses for is given up. Joints that do not move the tool
+    are at zero.
 
     Args:
         robot: it may be rigid.
-        payload: kg, rated, where it is known.
         seed: of the poses.
 
     Returns:
         the task; its note says what it is.
 
     Raises:
-        InputError: no joint moves the tool; the payload is not positive.
+        InputError: no joint moves the tool.
     """
-    content = default_task_content(robot, payload=payload, seed=seed)
-    force = content["excitation"]["force"]
-    why = "" if force == FORCE else ", the weight of the payload"
     return replace(
-        task_from_dict(content, robot),
-        note=f"No task was given, so one is assumed: {HITS} blows a rivet of {force:g} N{why}, "
-        f"along x, y and z, at {POSES} poses drawn with seed {seed}; picchio start writes it as a "
-        "file to edit",
+        task_from_dict(default_task_content(robot, seed=seed), robot),
+        note=f"No task was given: along x, y and z at {POSES} poses drawn with seed {seed}, with "
+        "blows that are assumed (--force, --period, --width and --hits change them; picchio start "
+        "writes the task as a file)",
     )
 
 
 def task_of(
-    robot: FlexibleRobot, task: Task | str | Path | None = None, *, payload: float | None = None
+    robot: FlexibleRobot,
+    task: Task | str | Path | None = None,
+    *,
+    force: float | None = None,
+    period: float | None = None,
+    width: float | None = None,
+    hits: int | None = None,
 ) -> Task:
     """The task that was given, else the robot's example, else `default_task`.
 
     Args:
         robot: that does it.
         task: one, or its file.
-        payload: kg, rated, where it is known; it bounds the default task's blows.
+        force: N, peak of one blow, in place of the example's or the default task's.
+        period: s, from one blow to the next, likewise.
+        width: s, of one blow, likewise.
+        hits: blows a rivet takes, likewise.
 
     Returns:
         the task.
 
     Raises:
-        InputError: as `load_task` and `default_task`.
+        InputError: as `load_task`, `default_task` and `blows_of`; blows beside a task.
     """
+    numbers = {"force": force, "period": period, "width": width, "hits": hits}
+    changed = {key: value for key, value in numbers.items() if value is not None}
+    if changed and task is not None:
+        key, value = next(iter(changed.items()))
+        raise InputError("belongs to an answer without a task: the task has its own blows",
+                         key=key, value=value)  # fmt: skip
     if isinstance(task, Task):
         return task
     path = task or robot.task_path
-    return default_task(robot, payload=payload) if path is None else load_task(path, robot)
+    work = default_task(robot) if path is None else load_task(path, robot)
+    own: dict[str, Any] = {} if hits is None else {"hits_per_rivet": hits}
+    if changed.keys() - {"hits"}:
+        with gathered():  # the task's note says what is assumed
+            own["excitation"] = blows_of(robot, force=force, period=period, width=width)
+    operations = tuple(replace(one, **own) for one in work.operations)
+    return replace(work, operations=operations, assumed=task is None)
 
 
-def default_task_content(
-    robot: FlexibleRobot, *, payload: float | None = None, seed: int = 0
-) -> dict[str, Any]:
+def default_task_content(robot: FlexibleRobot, *, seed: int = 0) -> dict[str, Any]:
     """`default_task` as a file `picchio-task/1` has it.
 
     Args:
-        robot: see `default_task`; likewise the rest.
-        payload: kg.
+        robot: see `default_task`.
         seed: of the poses.
 
     Returns:
@@ -110,17 +125,11 @@ def default_task_content(
     Raises:
         InputError: as `default_task`.
     """
-    if payload is not None and not (np.isfinite(payload) and payload > 0.0):
-        raise InputError("must be positive", key="payload", value=payload)
-    weight = FORCE if payload is None else min(FORCE, payload * GRAVITY)
     poses = [_written(robot, pose) for pose in default_poses(robot, seed=seed)]
     return {
         "format": FORMAT,
         "hits_per_rivet": HITS,
-        "excitation": {
-            **ASSUMED_BLOWS.given(),
-            "force": float(f"{weight:.3g}"),
-        },
+        "excitation": ASSUMED_BLOWS.given(),
         "operation": [
             {"name": f"along {'xyz'[k]}", "direction": np.eye(3)[k].tolist(), "poses": poses}
             for k in range(3)

@@ -12,15 +12,18 @@ from picchio.core.errors import InputError
 from picchio.core.files import write_text
 from picchio.core.provenance import provenance
 from picchio.core.results import Result
-from picchio.robot.annotations.sidecar import Sidecar
+from picchio.robot.annotations.inline import read_annotations
+from picchio.robot.annotations.sidecar import JointEntry, Sidecar, given, read_sidecar, spreads_of
 from picchio.robot.drives.reducer import Reducer
 from picchio.robot.estimate.rigid import left_rigid
 from picchio.robot.estimate.sidecar import estimated_sidecar
 from picchio.robot.estimate.template import beside, comment, literal, sidecar_text
 from picchio.robot.flexible_robot import FlexibleRobot
-from picchio.robot.loading.find import find_robot
+from picchio.robot.loading.find import FoundRobot, find_robot
 from picchio.robot.loading.load import load_robot
-from picchio.studies.default_task import FORCE, GRAVITY, default_task_content
+from picchio.robot.spread import ESTIMATE
+from picchio.robot.urdf.xml import parse_urdf, read_urdf_bytes
+from picchio.studies.default_task import default_task_content
 
 _TASK_HEAD = """\
 A first task for {name}, to be edited into yours. Nothing in it was measured.
@@ -49,9 +52,8 @@ class Start(Result):
         task: keys and values of the task file.
         order: of the joints in a pose that is a list.
         seed: of its poses.
-        payload: kg, as given, or None.
         rigid: the joints without a spring, by the reason.
-        known: joints that have a stiffness from elsewhere, in words; the sidecar has an estimate.
+        known: joints of which the robot's own files say something, in words; it stands.
         origin: what the estimates were made from, a sentence.
         inputs: files that were read.
         files: where the two were saved, or empty.
@@ -64,7 +66,6 @@ class Start(Result):
     task: Mapping[str, Any]
     order: tuple[str, ...]
     seed: int
-    payload: float | None
     rigid: Mapping[str, list[str]]
     known: Mapping[str, str]
     origin: str
@@ -85,19 +86,17 @@ class Start(Result):
     def task_text(self) -> str:
         """The task as a file, commented."""
         blows = self.task["excitation"]
-        force = "as in the paper behind picchio (Nie et al. 2016)"
-        if self.payload is not None and blows["force"] < FORCE:
-            force = f"the payload's weight, {self.payload:g} kg times {GRAVITY:g} m/s^2"
         lines = [
             *comment(_TASK_HEAD.format(name=self.robot)),
             f"format = {literal(self.task['format'])}",
             beside(f"hits_per_rivet = {self.task['hits_per_rivet']}", "blows of a rivet; assumed"),
             "",
-            *comment(f"The blows, all assumed: their force is {force}. Each force is taken to be "
-                     "uncertain by 5 %; `picchio assess --spread force=1.3` makes that 30 %."),
+            *comment("The blows, all assumed, as in the paper behind picchio (Nie et al. 2016). "
+                     "Each force is taken to be uncertain by 5 %; `picchio assess --spread "
+                     "force=1.3` makes that 30 %."),
             "[excitation]",
             beside(f"kind = {literal(blows['kind'])}", 'rectangular; or "half_sine_train"'),
-            beside(f"force = {literal(blows['force'])}", "N, height of a blow"),
+            beside(f"force = {literal(blows['force'])}", "N, peak force of one blow"),
             beside(f"period = {literal(blows['period'])}", "s, from one blow to the next"),
             beside(f"width = {literal(blows['width'])}", "s, duration of a blow"),
             "",
@@ -191,7 +190,7 @@ def start(
     Args:
         robot: a name from `picchio.robots()`, or a path to a URDF.
         tool: the frame on which the tool's force acts.
-        payload: kg, rated; it makes the estimates surer and bounds the blows.
+        payload: kg, rated; it makes the estimates surer.
         reach: m, rated, where the URDF's is not right.
         drive_class: strain-wave, cycloidal, planetary, direct or ball-screw.
         reducers: a catalogue's reducers by joint.
@@ -209,34 +208,53 @@ def start(
         loaded, payload=payload, reach=reach, drive_class=drive_class, reducers=reducers
     )
     found = find_robot(robot)
+    sidecar, known = _with_own(found, sidecar)
+    rigid: dict[str, list[str]] = {}
+    for out in left_rigid(loaded, sidecar.joint):
+        rigid.setdefault(out.why, []).append(out.joint)
     return Start(
         robot=loaded.name,
         asked=str(robot),
         stem=(found.name or found.urdf.stem).replace("/", "_"),
         sidecar=sidecar,
-        task=default_task_content(loaded, payload=payload, seed=seed),
+        task=default_task_content(loaded, seed=seed),
         order=loaded.joint_names_given,
         seed=seed,
-        payload=payload,
-        rigid=left_rigid(loaded, sidecar.joint),
-        known=_known(loaded, sidecar),
+        rigid=rigid,
+        known=known,
         origin=_origin(loaded, payload, reach, drive_class, reducers),
         inputs=loaded.files,
     )
 
 
-def _known(robot: FlexibleRobot, sidecar: Sidecar) -> dict[str, str]:
-    """Of estimated joints that have a stiffness of their own, what it is."""
-    found = {}
-    for joint in robot.flexible_joints:
-        if joint.name in sidecar.joint:
-            key = "stiffness" if joint.stiffness_curve is None else "stiffness_curve"
-            found[joint.name] = (
-                f"Its own files give it a stiffness: {literal(joint.stiffness)} N m/rad"
-                f"{' at no load' if joint.stiffness_curve else ''}, from "
-                f"{robot.origins[f'{joint.name}.{key}']}."
-            )
-    return found
+def _with_own(found: FoundRobot, sidecar: Sidecar) -> tuple[Sidecar, dict[str, str]]:
+    """The estimates, with what the robot's own files say in their place, and of which joints."""
+    if found.flex is not None:
+        own: Sidecar | None = read_sidecar(found.flex)
+    else:
+        own = read_annotations(parse_urdf(read_urdf_bytes(found.urdf), found.urdf), found.urdf)
+    if own is None:
+        return sidecar, {}
+    entries, told = dict(sidecar.joint), {}
+    for name in entries.keys() & own.joint.keys():
+        stated, guess = given(own.joint[name]), given(entries[name])
+        whose = stated.get("source", (found.flex or found.urdf).name)
+        bears: dict[str, Any] = {}
+        if not {"shaft", "reducer", "strength"} & stated.keys():
+            bears = {key: guess[key] for key in ("strength", "reducer") if key in guess}
+            bears["strength"] = bears["strength"].model_copy(update={"source": ESTIMATE})
+        if not own.joint[name].flexible:  # a sidecar may give a joint's shaft alone
+            bears = {key: value for key, value in guess.items() if key not in stated}
+        entries[name] = JointEntry(**(bears | stated | {"source": whose}))
+        told[name] = f"What its own files say, {whose}."
+    known = {spread.name for spread in spreads_of(sidecar.model_copy(update={"joint": entries}))}
+    mine = {f"{key}.{name}" for key in ("stiffness", "damping_ratio") for name in told}
+    changed = {
+        "joint": entries,
+        "tool": own.tool if own.tool is not None else sidecar.tool,
+        "posterior": sidecar.posterior and sidecar.posterior.among(known - mine),
+    }
+    return sidecar.model_copy(update=changed), told
 
 
 def _origin(

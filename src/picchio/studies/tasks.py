@@ -103,11 +103,13 @@ class Task:
         operations: in the order of the file.
         files: every file read, for provenance.
         note: what it is, where nobody gave one; else "".
+        assumed: nobody gave it: it is the robot's example, or drawn.
     """
 
     operations: tuple[Operation, ...]
     files: tuple[Path, ...] = ()
     note: str = ""
+    assumed: bool = False
 
     def __repr__(self) -> str:
         names = [op.name for op in self.operations]

@@ -14,9 +14,11 @@ from picchio.cli.life.how_sure import parse_spreads, show_spread
 from picchio.cli.options import (
     ClassOption,
     FlexOption,
+    ForceOption,
     GravityStiffnessOption,
     JsonOption,
     PayloadOption,
+    PeriodOption,
     ReachOption,
     ReducersOption,
     ReportOption,
@@ -24,6 +26,7 @@ from picchio.cli.options import (
     SNCurveOption,
     TaskOption,
     ToolOption,
+    WidthOption,
 )
 from picchio.cli.output import (
     console,
@@ -43,9 +46,9 @@ from picchio.studies.assessment.result import format_count
 
 if TYPE_CHECKING:
     from picchio.cli.layout import FittedTable
+    from picchio.studies.assessment.backwards import Allowable, AllowableLoads
     from picchio.studies.assessment.method_comparison import Term
     from picchio.studies.assessment.result import Assessment, JointLife, OperationResult
-    from picchio.studies.backwards import Allowable, AllowableLoads
     from picchio.studies.tasks import Task
 
 
@@ -59,6 +62,12 @@ def assess(
     payload: PayloadOption = None,
     reach: ReachOption = None,
     drive_class: ClassOption = None,
+    force: ForceOption = None,
+    period: PeriodOption = None,
+    width: WidthOption = None,
+    hits: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Blows of a rivet; likewise.")
+    ] = None,
     method: Annotated[
         str,
         typer.Option(
@@ -196,7 +205,7 @@ def assess(
             robot, flex=flex, tool=tool, reducers=reducers or (), payload=payload, reach=reach,
             drive_class=drive_class,
         )  # fmt: skip
-    work = task_of(loaded, task, payload=payload)
+    work = task_of(loaded, task, force=force, period=period, width=width, hits=hits)
     options: dict[str, Any] = {
         "sn_curve": sn_curve,
         "residue": residue,
@@ -281,26 +290,24 @@ _ROUNDING = 1e-9
 def show(found: Assessment, task: Task, terms: tuple[Term, ...] = ()) -> None:
     """Print an assessment."""
     out = console()
-    for line in filter(None, (found.notice, task.note)):
-        out.print(f"{line}.", style="bold yellow")
-        out.print()
+    told, allowed = found.verdict, found.allowable
     on = f" on {task.files[0].name}" if task.files else ""
-    rivets = count_of(task.rivets_per_pass, "rivet")
-    out.print(styled(found.robot, f"{on}: {rivets} a pass"))
-    for blows in dict.fromkeys(_blows(operation) for operation in found.operations):
-        out.print(f"  {blows}")
-        for operation in found.operations:
-            if _blows(operation) == blows:
-                x, y, z = operation.direction
-                out.print(
-                    f"    {operation.name}: {count_of(len(operation.poses), 'pose')}, force along "
-                    f"({x:.3g}, {y:.3g}, {z:.3g})"
-                )
-    if task.note:
-        poses = task.operations[0].poses
-        out.print("    the poses in rad, of a slide in m:")
-        for k, pose in enumerate(poses):
-            out.print(f"    pose {k + 1}: {', '.join(f'{q:.3g}' for q in pose)}")
+    out.print(styled(found.robot, f"{on}: {count_of(task.rivets_per_pass, 'rivet')} a pass"))
+    every = list(dict.fromkeys(_blows(operation) for operation in found.operations))
+    whose = "" if not task.assumed else ", of its example task" if task.files else ", assumed"
+    for blows in every:
+        out.print(f"  {blows}{whose}")
+    out.print()
+    if allowed is not None and not allowed.contrary:
+        out.print(
+            f"Allowable force of one blow: {allowed.force_told}, for "
+            f"{format_count(allowed[0].rivets)} rivets with blows of this width and rate.",
+            style="bold",
+        )
+    out.print(told.headline, style="bold")
+    out.print(styled("tool", f": {found.tool}"))
+    for line in filter(None, (found.notice, task.note)):
+        out.print(f"{line}.", style="yellow")
     out.print()
     out.print(_estimated_table(found) if found.notice else _life_table(found))
     reducers = [
@@ -320,11 +327,21 @@ def show(found: Assessment, task: Task, terms: tuple[Term, ...] = ()) -> None:
             ">used\n%",
         )
         out.print(table(heads, reducers, title="The reducers"))
-    told = found.verdict
-    out.print(told.headline, style="bold")
     for line in told.reasons:
         if line not in (found.notice, task.note):
             out.print(f"  - {line}")
+    out.print()
+    out.print("The task", style="dim")
+    for operation in found.operations:
+        x, y, z = operation.direction
+        which = f", {_blows(operation)}" if len(every) > 1 else ""
+        out.print(
+            f"  {operation.name}: {count_of(len(operation.poses), 'pose')}, force along "
+            f"({x:.3g}, {y:.3g}, {z:.3g}){which}"
+        )
+    if task.note:
+        for k, pose in enumerate(task.operations[0].poses):
+            out.print(f"  pose {k + 1}, rad (m): {', '.join(f'{q:.3g}' for q in pose)}")
     out.print()
     if len(found.operations) > 1 and any(joint.damage_share for joint in found.joints):
         out.print(_share_table(found))
@@ -432,7 +449,7 @@ def _terms_table(terms: tuple[Term, ...]) -> FittedTable:
 
 def _show_allowable(found: AllowableLoads, task: Task, life: Assessment) -> None:
     """Print what a target life allows."""
-    from picchio.studies.backwards import told_ends
+    from picchio.studies.assessment.backwards import told_ends
 
     out = console()
     load, torques = column(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from picchio.cli.output import console, styled, table
 from picchio.core.errors import InputError
-from picchio.robot.annotations.flexibility import ESTIMATE, is_estimate
+from picchio.robot.spread import ESTIMATE, is_estimate
 from picchio.studies.assessment.result import format_count
 
 if TYPE_CHECKING:

@@ -13,6 +13,7 @@ from picchio.cli.output import console, count_of, deliver, styled, table, to_wri
 from picchio.core.errors import InputError
 
 if TYPE_CHECKING:
+    from picchio.robot.annotations.sidecar import JointEntry
     from picchio.studies.start import Start
 
 _NAMED = 6  # rigid joints of one reason
@@ -69,6 +70,16 @@ def start(
     deliver(found.to_dict(), json, lambda: _show(found, out))
 
 
+def _range(entry: JointEntry, key: str, scale: float = 1.0) -> str:
+    """Where nine cases of ten lie; a number without a spread as it is."""
+    from picchio.robot.estimate.template import likely, told_range
+
+    value, spread = getattr(entry, key), getattr(entry, f"{key}_spread", None)
+    if value is None:
+        return "its curve" if key == "stiffness" and entry.stiffness_curve else "-"
+    return told_range(likely(scale * value, spread)) if spread else f"{scale * value:.3g}"
+
+
 def _show(found: Start, out: Path) -> None:
     from picchio.robot.estimate.template import likely, told_range
 
@@ -79,7 +90,7 @@ def _show(found: Start, out: Path) -> None:
     )  # fmt: skip
     rows = []
     for name, entry in found.sidecar.joint.items():
-        values, bears = entry.model_dump(), entry.strength
+        bears = entry.strength
         peak = "-"
         if bears is not None:
             spread = bears.model_dump()["repeated_peak_torque_spread"]
@@ -87,20 +98,20 @@ def _show(found: Start, out: Path) -> None:
             peak = told_range(likely(torque, spread)) if spread else f"{torque:g}, {entry.reducer}"
         rows.append((
             name,
-            told_range(likely(values["stiffness"], values["stiffness_spread"])),
-            told_range(likely(100 * values["damping_ratio"], values["damping_ratio_spread"])),
+            _range(entry, "stiffness"),
+            _range(entry, "damping_ratio", 100.0),
             peak,
         ))  # fmt: skip
     heads = ("joint", ">stiffness\nN m/rad", ">damping\n%", ">repeated peak\ntorque, N m")
     screen.print(table(heads, rows, title="Where nine cases of ten lie"))
     for reason, joints in found.rigid.items():
         more = f" and {len(joints) - _NAMED} more" if len(joints) > _NAMED else ""
-        screen.print(f"  - Left rigid: {reason}: {', '.join(joints[:_NAMED])}{more}.")
+        screen.print(f"  - Left rigid: {', '.join(joints[:_NAMED])}{more}: it {reason}.")
     if found.known:
         every = len(found.known) == len(found.sidecar.joint)
         screen.print(
-            f"  - Its own files have a stiffness of {'each' if every else ', '.join(found.known)}; "
-            "the sidecar has estimates in their place, and says what stood there."
+            f"  - What its own files say of {'each joint' if every else ', '.join(found.known)} "
+            "stands; only the rest is estimated."
         )
     blows = found.task["excitation"]
     screen.print(

@@ -56,7 +56,7 @@ class SNCurve:
         tensile_strength: Pa, R_m, for the FKM mean stress sensitivity and surface factor.
         source: where the numbers come from.
         warning: why not to use it for real work, if there is a reason.
-        unverified: which of its numbers nobody has held against a source, if any.
+        unverified: which of its numbers are an engineering assumption, no source, if any.
         assumptions: what was changed since, in words, to print with a result.
         kind: "shear", or "torque" (amplitudes are shares of a drive's torque for repeated peaks;
             `ultimate_shear` is the share that a steady torque alone would have to reach).

@@ -38,7 +38,7 @@ class SNCurveFile(StrictModel):
         tensile_strength: Pa, R_m, for FKM's mean stress sensitivity and surface factor.
         source: where the numbers come from.
         warning: why not to use the curve for real work, if there is a reason.
-        unverified: which of its numbers nobody has held against a source, if any; a verdict tells.
+        unverified: which of its numbers are an engineering assumption without a source, if any.
         assumptions: sentences to print with every result.
     """
 

@@ -17,15 +17,13 @@ from picchio.core.toml import StrictModel
 from picchio.robot.annotations.sidecar import JointEntry, Sidecar, given, spreads_within
 from picchio.robot.drives.reducer import Reducer, find_reducer
 from picchio.robot.joint import Joint, Strength
-from picchio.robot.spread import Spread, numbers_of, overlaid, spreads_in, value_of
+from picchio.robot.spread import Spread, is_estimate, numbers_of, overlaid, spreads_in, value_of
 from picchio.robot.urdf.tree import MOVABLE, UrdfJoint, UrdfTree
 
 DEFAULT_DAMPING_RATIO = 0.03
 # One of these excludes the other, wherever they stand.
 # The origin of a stiffness that a reducer's catalogue gives begins so.
 ITS_REDUCER = "the catalogue of its reducer"
-# The label of the source that stands in where no file says anything.
-ESTIMATE = "picchio's estimate"
 EXCLUDED = {"stiffness": "stiffness_curve", "stiffness_curve": "stiffness"}
 
 
@@ -118,15 +116,6 @@ def flexible_joints(
             where["damping_ratio"] = "picchio's default, not measured"
         origins.update({f"{name}.{key}": text for key, text in where.items()})
     return joints, origins, spreads
-
-
-def is_estimate(origin: str) -> bool:
-    """Whether a value is picchio's own estimate, in memory or written by `picchio start`.
-
-    Args:
-        origin: of the value.
-    """
-    return ESTIMATE in origin
 
 
 def estimate_notice(name: str, origins: Mapping[str, str]) -> str:
@@ -248,7 +237,7 @@ def _merge(name: str, sources: Sequence[Source]) -> tuple[dict[str, Any], dict[s
             if key == "estimated" and not entry.flexible:
                 continue
             values[key] = value
-            where[key] = source.origin(entry.source)
+            where[key] = source.origin(getattr(value, "source", None) or entry.source)
             if entry.estimated and entry.flexible and not stronger & set(_spread_keys(key)):
                 guessed |= {key, *entry.implied}
     return values, where, guessed

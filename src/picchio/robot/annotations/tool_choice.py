@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,10 +18,16 @@ from picchio.robot.tool import Gun, Mounting, Tool
 from picchio.robot.urdf.shapes import placement
 from picchio.robot.urdf.tree import MOVABLE, UrdfTree
 
+if TYPE_CHECKING:
+    from picchio.robot.flexible_robot import FlexibleRobot
+
 # Usual names of the frame at the end of an arm, the likeliest first.
 USUAL = ("tool", "tcp", "tool0", "tool_frame", "ee_link", "flange", "link_tcp", "end_effector")
 # What such names end in, likewise.
 CONVENTION = ("tcp", "tool0", "tool", "ee", "eef", "effector", "flange")
+
+_CHOSEN = "chosen: "  # before the reason, where no file and nobody names the frame
+_ON_AXIS = 1e-6  # m; a point nearer to an axis than this lies on it
 
 _ARM = 3  # joints that lead to a hand, at least
 
@@ -43,7 +50,8 @@ def choose_tool(
     if argument is not None:
         values["frame"], origins["tool.frame"] = _link(tree, argument, None, "--tool"), "argument"
     if "frame" not in values:
-        values["frame"], origins["tool.frame"] = _usual_frame(tree, srdf)
+        values["frame"], why = _usual_frame(tree, srdf)
+        origins["tool.frame"] = _CHOSEN + why
     if "axis" in values:
         values["axis"] = tuple((np.array(values["axis"]) / np.linalg.norm(values["axis"])).tolist())
     return Tool.model_construct(**values), origins  # each value was checked where it stands
@@ -135,6 +143,62 @@ def _place(tree: UrdfTree, link: str) -> tuple[str, tuple[float, ...]]:
         matrix = placement(joint.xyz, joint.rpy) @ matrix
         link = joint.parent
     return link, tuple((matrix.round(6) + 0.0).ravel().tolist())
+
+
+@dataclass(frozen=True)
+class ToolPlace:
+    """Where the blows act, and why there.
+
+    Attributes:
+        frame: the link whose frame carries the tool.
+        link: the one that it is fixed to, behind the last joint that moves it.
+        xyz: m, the point where the force acts, in that link.
+        why: the frame was taken, in words.
+        joint: the last joint that moves the tool, where the point lies on its axis; else "".
+        doubt: what is odd about it, a sentence; "" where nothing is.
+    """
+
+    frame: str
+    link: str
+    xyz: tuple[float, float, float]
+    why: str
+    joint: str = ""
+    doubt: str = ""
+
+    def __str__(self) -> str:
+        x, y, z = (f"{part + 0.0:.3g}" for part in self.xyz)
+        text = f"frame {self.frame}, at ({x}, {y}, {z}) m in {self.link}, because {self.why}"
+        return f"{text}; it lies on the axis of {self.joint}" if self.joint else text
+
+
+def tool_place(robot: FlexibleRobot) -> ToolPlace:
+    """Where a robot's tool is, and why there.
+
+    Args:
+        robot: as loaded.
+    """
+    tree, frame = robot.tree, robot.tool.frame
+    link, rows = _place(tree, frame)
+    matrix = np.array(rows).reshape(4, 4)
+    point = matrix[:3, :3] @ robot.tool.xyz + matrix[:3, 3]
+    origin = robot.origins.get("tool.frame", "")
+    chosen = origin.startswith(_CHOSEN)
+    why = origin.removeprefix(_CHOSEN) if chosen else f"{origin or 'the robot'} says so"
+    last = next((joint for joint in tree.joints.values() if joint.child == link), None)
+    name = doubt = ""
+    if last is not None and last.type in ("revolute", "continuous"):
+        axis = np.array(last.axis) / np.linalg.norm(last.axis)
+        if np.linalg.norm(np.cross(axis, point)) < _ON_AXIS:
+            name = last.name
+            # A flange turns about the way that its tool points; a hinge's tool stands off it.
+            rolls = np.linalg.norm(np.cross(axis, matrix[:3, :3] @ robot.tool.axis)) < _ON_AXIS
+            if chosen and (frame == link or not rolls):
+                doubt = (
+                    f"the tool frame {frame} lies on the axis of {name}, its last joint, which no "
+                    "blow there loads, and the joints before it less than a tool that stands off: "
+                    "if it does, name its frame with --tool or give [tool] xyz in the sidecar"
+                )
+    return ToolPlace(frame, link, tuple(point.round(6).tolist()), why, name, doubt)
 
 
 def choose_gun(sources: Sequence[Source]) -> tuple[Gun | None, dict[str, str]]:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from picchio.core.errors import InputError
+from picchio.robot.spread import is_estimate
 
 if TYPE_CHECKING:
     from picchio.robot.flexible_robot import FlexibleRobot
@@ -53,11 +55,13 @@ class Predictors:
         values: (n, 6) natural logarithms in the order of `QUANTITIES`: kg m^2, N m, m, N m, rad/s,
             kg; NaN where not known.
         place: (n, 2) zeros and ones: the first joint, a joint of the wrist.
+        refused: why an effort limit that the file gives is no evidence, by joint.
     """
 
     names: tuple[str, ...]
     values: Array
     place: Array
+    refused: Mapping[str, str] = field(default_factory=dict)
 
 
 def places(joints: int) -> Array:
@@ -82,8 +86,8 @@ def predictors(
     distance from the axis the largest magnitudes, over 400 poses within the limits (within half a
     turn where there are none). Of a wrist, inertia and gravity's torque are left out: what a URDF
     has there depends on the tool, and often on the wrist, that it leaves out. A limit of zero is
-    one that the file does not know. The payload is the robot's: it stands with the first joint,
-    once.
+    one that the file does not know, and so are those that `placeholders` refuses. The payload is
+    the robot's: it stands with the first joint, once.
 
     Args:
         robot: it may be rigid.
@@ -101,12 +105,8 @@ def predictors(
         if value is not None and not (np.isfinite(value) and value > 0.0):
             raise InputError("must be positive", key=key, value=value)
     rigid, frame = robot.rigid, robot.rigid.frame(robot.tool_point)
-    lower = np.where(np.isfinite(robot.lower), robot.lower, -np.pi)
-    upper = np.where(np.isfinite(robot.upper), robot.upper, np.pi)
-    rng = np.random.default_rng(_SEED)
-    poses = lower + (upper - lower) * rng.random((_POSES, rigid.nv))
     inertia, gravity, lever, turn = (np.zeros(rigid.nv) for _ in range(4))
-    for pose in poses:
+    for pose in _drawn_poses(robot):
         jacobian = rigid.jacobian(pose, frame)
         inertia = np.maximum(inertia, np.diag(rigid.mass_matrix(pose)))
         gravity = np.maximum(gravity, np.abs(rigid.gravity_torque(pose)))
@@ -119,6 +119,7 @@ def predictors(
     names = tuple(rigid.joint_names[k] for k in chain)
     joints = [robot.tree.joints[name] for name in names]
     place = places(len(names))
+    refused = placeholders(robot)
     wrist = place[:, 1] > 0.0
     lever = lever[chain] * (1.0 if reach is None else reach / lever[chain].max())
     columns = np.stack(
@@ -126,7 +127,7 @@ def predictors(
             np.where(wrist, 0.0, inertia[chain]),
             np.where(wrist | (gravity[chain] < _NOTHING * gravity.max()), 0.0, gravity[chain]),
             np.where(lever < _NOTHING * lever.max(), 0.0, lever),
-            [joint.effort for joint in joints],
+            [0.0 if joint.name in refused else joint.effort for joint in joints],
             [joint.velocity for joint in joints],
             place[:, 0] * (payload or 0.0),
         ],
@@ -135,4 +136,68 @@ def predictors(
     known = (columns > 0.0) & np.isfinite(columns)
     values = np.full(columns.shape, np.nan)
     values[known] = np.log(columns[known])
-    return Predictors(names, values, place)
+    return Predictors(
+        names, values, place, {name: refused[name] for name in names if name in refused}
+    )
+
+
+def placeholders(robot: FlexibleRobot) -> dict[str, str]:
+    """The effort limits that somebody filled in so that the file could be read.
+
+    They are evidence together or not at all, since one hand wrote them: a number that stands at
+    every joint tells nothing of any, and a file in which a joint could not hold the arm's own
+    links (without tool and gun; over 400 poses within the limits) does not know its drives.
+
+    Args:
+        robot: it may be rigid.
+
+    Returns:
+        why, by joint that moves the tool, rotary and sliding ones apart; empty where the limits
+        may stand.
+    """
+    chain = [
+        joint for joint in robot.tree.chain(robot.tool_frame) if joint.name in robot.joint_names
+    ]
+    # An estimated weight is no evidence against a limit.
+    masses = (text for key, text in robot.origins.items() if key.endswith(".mass"))
+    weighed = not any(map(is_estimate, masses))
+    own = dict(zip(robot.joint_names, _own_weight(robot) * weighed, strict=True))
+    found: dict[str, str] = {}
+    for slides in (False, True):
+        given = [joint for joint in chain if (joint.type == "prismatic") == slides
+                 and 0.0 < joint.effort < np.inf]  # fmt: skip
+        unit = "N" if slides else "N m"
+        weak = [joint for joint in given if joint.effort < own[joint.name]]
+        if len({joint.effort for joint in given}) == 1 and len(given) > 1:
+            why = f"{given[0].effort:g} {unit} stands at every joint: a placeholder"
+        elif weak:
+            worst = max(weak, key=lambda joint: own[joint.name] / joint.effort)
+            why = (
+                f"{worst.name} could not hold the arm's own links: they take "
+                f"{own[worst.name]:.3g} {unit}, and its limit is {worst.effort:g} {unit}"
+            )
+        else:
+            continue
+        found |= {joint.name: why for joint in given}
+    return found
+
+
+def _own_weight(robot: FlexibleRobot) -> Array:
+    """What each joint holds of the arm alone at most, (nv,) N m or N."""
+    load = robot.tool.mass + (robot.gun.mass if robot.gun else 0.0)
+    frame = robot.rigid.frame(robot.tool_point)
+    pull = load * np.array(robot.mounting.gravity)
+    most = np.zeros(robot.rigid.nv)
+    for pose in _drawn_poses(robot):
+        torque = robot.rigid.gravity_torque(pose) + robot.rigid.jacobian(pose, frame)[:3].T @ pull
+        most = np.maximum(most, np.abs(torque))
+    return most
+
+
+def _drawn_poses(robot: FlexibleRobot) -> Array:
+    """400 poses within the limits, (400, nv); within half a turn where there are none."""
+    lower = np.where(np.isfinite(robot.lower), robot.lower, -np.pi)
+    upper = np.where(np.isfinite(robot.upper), robot.upper, np.pi)
+    rng = np.random.default_rng(_SEED)
+    poses: Array = lower + (upper - lower) * rng.random((_POSES, robot.rigid.nv))
+    return poses

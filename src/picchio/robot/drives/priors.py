@@ -422,10 +422,12 @@ def _strength_reasons(
         return [f"the catalogue of its reducer {reducer.name}"]
     effort = found.values[k, QUANTITIES.index("effort")]
     ratio = torque_ratios(kind).peak_over_rated
+    refused = found.refused.get(found.names[k], "")
     told = (
         f"from {meaning['effort']}, {math.exp(effort):.3g} N m"
         if np.isfinite(effort)
-        else "no effort limit is known: it is foretold from what the joint moves and holds"
+        else f"no effort limit is known{f' ({refused})' if refused else ''}: it is foretold from "
+        "what the joint moves and holds"
     )
     return [
         f"{told}; it is taken to lie between the reducer's rated torque and its limit for repeated "

@@ -23,6 +23,7 @@ from picchio.core.errors import InputError
 from picchio.robot.dynamics.rigid_model import RigidModel
 from picchio.robot.link import LinkEntry
 from picchio.robot.masses.check import WAYS_OUT, weighs
+from picchio.robot.spread import ESTIMATE
 from picchio.robot.urdf.normalised import normalise
 from picchio.robot.urdf.shapes import link_ends
 from picchio.robot.urdf.tree import MOVABLE, ZERO, Inertial
@@ -97,7 +98,9 @@ def weighted(robot: FlexibleRobot, links: Mapping[str, LinkEntry]) -> FlexibleRo
     tree = replace(robot.tree, links={**robot.tree.links, **bodies})
     text, point, _ = normalise(tree, robot.tool, robot.gun, robot.mounting)
     rigid = RigidModel(text, tree, robot.mounting.gravity)
-    return replace(robot, tree=tree, rigid=rigid, tool_point=point)
+    guessed = {f"link.{name}.mass": ESTIMATE for name in links}
+    return replace(robot, tree=tree, rigid=rigid, tool_point=point,
+                   origins={**robot.origins, **guessed})  # fmt: skip
 
 
 def masses(lengths: FloatArray) -> FloatArray:

@@ -14,13 +14,14 @@ import numpy as np
 
 from picchio.core.errors import InputError
 from picchio.robot.annotations.sidecar import JointEntry, Sidecar, spreads_of
+from picchio.robot.drives.predictors import placeholders
 from picchio.robot.drives.priors import DrivePriors, JointPrior, drive_priors
 from picchio.robot.drives.strength import slide_strength
 from picchio.robot.estimate.masses import SPREAD, estimated_masses, weighted
 from picchio.robot.joint import Strength
 from picchio.robot.link import LinkEntry
 from picchio.robot.masses.check import WAYS_OUT, carrying, check_count
-from picchio.robot.spread import Posterior
+from picchio.robot.spread import ESTIMATE, Posterior, is_estimate
 from picchio.robot.tool import Tool
 
 if TYPE_CHECKING:
@@ -131,8 +132,9 @@ def slide_entries(robot: FlexibleRobot, names: Collection[str]) -> dict[str, Joi
         by joint, those that slide and have an effort limit.
     """
     found = {}
+    refused = placeholders(robot)
     for joint in robot.flexible_joints:
-        if joint.kind != "prismatic" or joint.name not in names:
+        if joint.kind != "prismatic" or joint.name not in names or joint.name in refused:
             continue
         if not math.isfinite(joint.effort_limit):
             continue
@@ -145,6 +147,26 @@ def slide_entries(robot: FlexibleRobot, names: Collection[str]) -> dict[str, Joi
         )
         found[joint.name] = JointEntry(strength=bears, source=source)
     return found
+
+
+def refused_efforts(robot: FlexibleRobot) -> dict[str, str]:
+    """Why the URDF's effort limit counts as unknown, where what a drive bears would rest on it.
+
+    Args:
+        robot: as loaded.
+
+    Returns:
+        by joint, those whose strength is picchio's own estimate, or not known.
+    """
+    refused = placeholders(robot)
+    return {
+        joint.name: refused[joint.name]
+        for joint in robot.flexible_joints
+        if joint.name in refused
+        and joint.shaft is None
+        and joint.reducer is None
+        and is_estimate(robot.origins.get(f"{joint.name}.strength", ESTIMATE))
+    }
 
 
 def rounded(value: float) -> float:

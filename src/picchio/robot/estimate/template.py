@@ -9,10 +9,9 @@ from typing import Any
 import tomlkit
 
 from picchio.core.toml import StrictModel
-from picchio.robot.annotations.flexibility import ESTIMATE
 from picchio.robot.annotations.sidecar import FORMAT, JointEntry, Sidecar, given
 from picchio.robot.link import LinkEntry
-from picchio.robot.spread import Posterior, value_of
+from picchio.robot.spread import ESTIMATE, Posterior, value_of
 
 WIDTH = 79
 NINE_IN_TEN = 1.645
@@ -23,7 +22,7 @@ _UNIT = {"stiffness": "N m/rad", "damping_ratio": "", "repeated_peak_torque": "N
          "rated_torque": "N m", "momentary_peak_torque": "N m"}  # fmt: skip
 _EXACT = {"momentary_peak_torque": "goes with the repeated one"}
 _HEAD = """\
-{name}: its drives, estimated. No number in this file was measured.
+{name}: its drives, estimated. Nothing was measured but what the robot's own files say.
 
 {origin}
 
@@ -71,10 +70,11 @@ def sidecar_text(
         lines += ["", *comment(f"{body.source}." if body.source else ""),
                   f"[link.{_key(link)}]", *_link(body)]  # fmt: skip
     for joint, entry in sidecar.joint.items():
-        why = " ".join(part for part in (entry.source, notes.get(joint)) if part)
-        lines += ["", *comment(why), f"[joint.{_key(joint)}]", *_joint(joint, entry)]
+        why = notes.get(joint, entry.source or "")
+        lines += ["", *comment(why), f"[joint.{_key(joint)}]",
+                  *_joint(joint, entry, own=joint in notes)]  # fmt: skip
     for reason, joints in rigid.items():
-        lines += ["", *comment(f"Left rigid: {reason}: {', '.join(joints)}.")]
+        lines += ["", *comment(f"Left rigid: {', '.join(joints)}: it {reason}.")]
     if sidecar.posterior is not None:
         lines += ["", *comment(_POSTERIOR), "[posterior]", *_posterior(sidecar.posterior)]
     return "\n".join(lines) + "\n"
@@ -171,12 +171,13 @@ def _key(name: str) -> str:
     return tomlkit.item({name: 1}).as_string().partition("=")[0].strip()
 
 
-def _joint(name: str, entry: JointEntry) -> Iterator[str]:
+def _joint(name: str, entry: JointEntry, *, own: bool) -> Iterator[str]:
     values = given(entry)
     yield from _keys(
-        {key: value for key, value in values.items() if key not in ("source", "strength")}
+        {key: value for key, value in values.items() if key not in ("source", "strength")},
+        "as its own files have it" if own else "its reducer's",
     )
-    yield f"source = {literal(ESTIMATE)}"
+    yield f"source = {literal((entry.source or '') if own else ESTIMATE)}"
     if entry.strength is not None:
         yield f"[joint.{_key(name)}.strength]"
         yield from _keys(given(entry.strength))
@@ -189,7 +190,7 @@ def _link(entry: LinkEntry) -> Iterator[str]:
     yield f"source = {literal(ESTIMATE)}"
 
 
-def _keys(values: Mapping[str, Any]) -> Iterator[str]:
+def _keys(values: Mapping[str, Any], exact: str = "its reducer's") -> Iterator[str]:
     """A key a line, its spread below it; beside a number of a drive its unit and range."""
     for key, value in values.items():
         if value_of(key) != key:
@@ -197,9 +198,7 @@ def _keys(values: Mapping[str, Any]) -> Iterator[str]:
         spread = values.get(f"{key}_spread")
         text, unit = f"{key} = {literal(value)}", _UNIT.get(key)
         if unit is not None:
-            known = (
-                told_range(likely(value, spread)) if spread else _EXACT.get(key, "its reducer's")
-            )
+            known = told_range(likely(value, spread)) if spread else _EXACT.get(key, exact)
             text = beside(text, f"{unit}; {known}" if unit else known)
         yield text
         if spread is not None:

@@ -14,7 +14,6 @@ from picchio.core.errors import InputError, gathered, held_back, warn_user
 from picchio.core.guard import guard
 from picchio.core.toml import validate
 from picchio.robot.annotations.flexibility import (
-    ESTIMATE,
     Source,
     estimate_notice,
     flexible_joints,
@@ -39,6 +38,7 @@ from picchio.robot.loading.saved_model import is_saved_model, read_saved_model
 from picchio.robot.masses.check import check_masses
 from picchio.robot.masses.doubts import findings_of
 from picchio.robot.masses.given import give_masses
+from picchio.robot.spread import ESTIMATE
 from picchio.robot.urdf.addresses import resolve_mesh
 from picchio.robot.urdf.check import read_tree
 from picchio.robot.urdf.normalised import normalise
@@ -94,15 +94,23 @@ def load_robot(
     if isinstance(reducers, str | Path):
         reducers = (reducers,)
     asked = (robot, flex, tool, values, reducers)
+    from picchio.robot.estimate.sidecar import refused_efforts
+
     with held_back() as remarks:
         loaded = _load(*asked, None)
     known = {"payload": payload, "reach": reach, "drive_class": drive_class}
     guess = None if allow_rigid else _estimate(loaded, known)
+    unused = [key for key, value in known.items() if value is not None]
+    if guess is None and unused:
+        warn_user(f"{', '.join(unused)}: not used, since nothing of {loaded.name}'s drives is "
+                  "estimated")  # fmt: skip
     if guess is not None:
         with held_back() as remarks:  # the same again, and what the estimates bring
             loaded = _load(*asked, Source(ESTIMATE, guess, strict=False))
             if any(entry.flexible for entry in guess.joint.values()):
                 warn_user(estimate_notice(loaded.name, loaded.origins))
+            for why in dict.fromkeys(refused_efforts(loaded).values()):
+                warn_user(f"the URDF's effort limits are not believed, and count as unknown: {why}")
     with gathered() as said:
         for remark in remarks:
             warn_user(remark)

@@ -17,11 +17,11 @@ from lxml import etree
 
 from picchio.core.arrays import FloatArray, symmetric
 from picchio.core.errors import InputError
-from picchio.robot.annotations.flexibility import is_estimate
 from picchio.robot.finding import Finding, Severity
 from picchio.robot.masses.by_volume import Body, bodies
 from picchio.robot.masses.check import general_pose, moving_links
 from picchio.robot.masses.proportions import extent, gyration, out_of_proportion
+from picchio.robot.spread import is_estimate
 from picchio.robot.units import TURNING
 from picchio.robot.urdf.check import LEAST_MOMENT, bad_inertia
 from picchio.robot.urdf.shapes import link_ends, placement

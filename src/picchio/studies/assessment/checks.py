@@ -13,10 +13,11 @@ from picchio.fatigue.miner import life
 from picchio.fatigue.shaft_stress import check_shaft
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.model.model import Model
-from picchio.robot.annotations.flexibility import ITS_REDUCER, is_estimate
+from picchio.robot.annotations.flexibility import ITS_REDUCER
 from picchio.robot.drives.reducer import Reducer
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.joint import is_drive
+from picchio.robot.spread import is_estimate
 from picchio.studies.assessment.result import JointLife, OperationResult, SteadyStateCheck
 from picchio.studies.assessment.verdict import MUCH_GROWTH, RATE_STEP, SHAFT_TOLERANCE, softer
 from picchio.studies.rivet.life_rules import LifeRule, peak
@@ -107,7 +108,7 @@ def assumptions_of(
             if model.gravity_balanced
             else ()
         ),
-        "the motor side of every joint stands still while the tool hits",
+        "motors assumed locked while the tool hits",
         *(f"the model has the effect {effect!r}" for effect in model.effects),
         *model.without_load(),
         *_estimates(model.robot),
@@ -210,7 +211,8 @@ def doubts_of(
     lines = [*_estimates(model.robot), *model.without_load()]
     for curve in dict.fromkeys(c for c in curves if c is not None):
         if curve.unverified:
-            lines.append(f"{curve.title} {curve.name} is unverified: {curve.unverified}")
+            lines.append(f"{curve.title} {curve.name}: engineering assumption, no source, for "
+                         f"{curve.unverified}")  # fmt: skip
     ratios = [(check.peak_ratio, check.joint) for check in steady if check.peak_ratio > 1.0]
     if needs == "steady" and ratios:
         ratio, name = max(ratios)

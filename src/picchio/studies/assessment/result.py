@@ -22,6 +22,9 @@ from picchio.studies.assessment.verdict import Verdict, judge
 
 if TYPE_CHECKING:
     from picchio.fatigue.uncertain_lives import LifeSpread
+    from picchio.robot.annotations.tool_choice import ToolPlace
+    from picchio.robot.estimate.rigid import LeftRigid
+    from picchio.studies.assessment.backwards import AllowableLoads
     from picchio.studies.uncertainty.result import UncertainLife
 
 # What an assessment found: the life of every joint, and where it goes.
@@ -309,6 +312,11 @@ class Assessment(TableResult):
         doubts: what else lowers trust in the result, a sentence each.
         uncertainty: the lives as distributions, where a value of the robot has a spread.
         task_note: what the task is, where nobody gave one; else "".
+        left_out: the joints that can move and have no spring, and why.
+        refused: why the URDF's effort limit was not believed, by joint whose strength is estimated.
+        impossible: what of the robot's own numbers cannot be, a sentence each.
+        tool: the tool's frame, where it is and why it was taken.
+        allowable: which force the task's places allow, where no task was given; None otherwise.
     """
 
     PAGE = "visuals.report.assessment:assessment_report"
@@ -339,6 +347,11 @@ class Assessment(TableResult):
     doubts: tuple[str, ...] = ()
     uncertainty: UncertainLife | None = None
     task_note: str = ""
+    left_out: tuple[LeftRigid, ...] = ()
+    refused: Mapping[str, str] = field(default_factory=dict)
+    impossible: tuple[str, ...] = ()
+    tool: ToolPlace | None = None
+    allowable: AllowableLoads | None = None
 
     @property
     def estimated(self) -> bool:
@@ -466,7 +479,8 @@ class Assessment(TableResult):
         return sheet(f"Assessment of {self.robot}", facts, list(table), rows, note, head)
 
     def _content(self) -> dict[str, Any]:
-        hidden = ("doubts", "uncertainty", "task_note")
+        hidden = ("doubts", "uncertainty", "task_note", "left_out", "refused", "impossible",
+                  "allowable")  # fmt: skip
         own = {key: value for key, value in vars(self).items() if key not in hidden}
         if self.uncertainty is not None:
             own |= {
@@ -477,5 +491,7 @@ class Assessment(TableResult):
                 "measure_first": self.uncertainty.measure_first,
                 "uncertainty": self.uncertainty.to_dict(),
             }
+        if self.allowable is not None:
+            own |= {"allowable": self.allowable.to_dict()["allowable"]}
         ranked = self.false_brinelling
         return {"format": FORMAT, "verdict": self.verdict, **own, "false_brinelling": ranked}

@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from picchio.core.arrays import FloatArray
-from picchio.core.errors import InputError, gathered
+from picchio.core.errors import InputError, gathered, warn_user
 from picchio.core.processes import one_thread
 from picchio.core.provenance import provenance
 from picchio.fatigue.counting.counter import Residue
@@ -21,10 +21,14 @@ from picchio.fatigue.sn.curve import MinerRule, SNCurve
 from picchio.fatigue.sn.library import PAPER_SN_CURVE, load_sn_curve
 from picchio.fatigue.standstill import false_brinelling, swings
 from picchio.model.model import Model
+from picchio.robot.annotations.tool_choice import tool_place
 from picchio.robot.drives.reducer import Reducer
 from picchio.robot.dynamics.pose import warn_beyond_limits
+from picchio.robot.estimate.rigid import left_rigid
+from picchio.robot.estimate.sidecar import refused_efforts
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.joint import Strength
+from picchio.studies.assessment.backwards import allowable
 from picchio.studies.assessment.checks import (
     assumptions_of,
     doubts_of,
@@ -35,7 +39,7 @@ from picchio.studies.assessment.checks import (
 )
 from picchio.studies.assessment.inputs import inputs_of
 from picchio.studies.assessment.result import Assessment, JointLife, OperationResult
-from picchio.studies.default_task import task_of
+from picchio.studies.default_task import LIFE, task_of
 from picchio.studies.rivet.life_rules import LifeRule, PaperRule, RainflowRule, curves_of, peak
 from picchio.studies.rivet.pose import Rivet, need_springs
 from picchio.studies.tasks import Operation, Task
@@ -111,7 +115,10 @@ def assess(
     rule: LifeRule = PaperRule() if method == "paper" else RainflowRule(residue, mean_stress, miner)
     if sn_curve is None and method == "paper":
         sn_curve = PAPER_SN_CURVE
+    place = tool_place(robot)
     with gathered() as said:
+        if place.doubt:
+            warn_user(place.doubt)
         curves = curves_of(robot, sn_curve, drives=method == "rainflow")
         warn_about_shafts(robot)
         for operation in task.operations:
@@ -178,6 +185,12 @@ def assess(
         guess = bool(unsure.estimated)
         joints = tuple(_with_spread(joint, unsure, guess) for joint in joints)
         doubts = (unsure.doubt(), *doubts)
+    allowed = None
+    if task.assumed and rule.needs == "rest" and miner is None and parts:
+        allowed = allowable(
+            model, task, LIFE, sn_curve=sn_curve, residue=residue, mean_stress=mean_stress,
+            thorough=False,
+        )  # fmt: skip
     limiting = _limiting(joints)
     lasts = limiting.life if limiting else math.inf
     if unsure is not None and unsure.estimated:
@@ -209,6 +222,11 @@ def assess(
         ),
         warnings=tuple(dict.fromkeys([*robot.warnings, *said, *more])),
         doubts=doubts,
+        left_out=left_rigid(robot),
+        refused=refused_efforts(robot),
+        impossible=tuple(str(one) for one in robot.findings if one.severity == "impossible"),
+        tool=place,
+        allowable=allowed,
     )
 
 

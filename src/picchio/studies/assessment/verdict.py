@@ -44,6 +44,22 @@ MUCH_GROWTH = 1.25
 
 
 @dataclass(frozen=True)
+class NotAssessed:
+    """What a verdict does not cover.
+
+    Attributes:
+        joint: its name.
+        part: "shaft", "reducer", "yield"; "joint" where it was left rigid; "effort limit" where
+            the URDF's was not believed.
+        why: in words.
+    """
+
+    joint: str
+    part: str
+    why: str
+
+
+@dataclass(frozen=True)
 class Verdict:
     """The result of an assessment in a few words.
 
@@ -62,6 +78,9 @@ class Verdict:
         limit: that the governing part is nearest to, in words.
         headline: the verdict as sentences.
         estimated: it rests on what drives like these probably bear, which nobody measured.
+        covers: the parts that were looked at in every joint: "shaft", "reducer" (or what stands
+            in for it, the drive as a whole).
+        not_assessed: every part and joint that was not looked at.
     """
 
     status: Status
@@ -75,6 +94,8 @@ class Verdict:
     headline: str
     margin_interval: tuple[float, float] | None = None
     estimated: bool = False
+    covers: tuple[str, ...] = ()
+    not_assessed: tuple[NotAssessed, ...] = ()
 
     @property
     def promised(self) -> bool:
@@ -163,12 +184,17 @@ def judge(found: Assessment) -> Verdict:
     unknown = [j for j in found.joints if is_drive(j.name) and j.name not in told]
     unknown.sort(key=lambda joint: -joint.peak_deflection)
     guess = bool(found.notice)
+    out = [one for one in found.left_out if one.moves_tool]
+    gaps = tuple(_gaps(found))
+    covers = tuple(part for part in _PARTS if found.joints and not _lacking(gaps, part))
     near = [part for part in worst if part.margin_at_other_rates < 1.0]
-    risk_first = bool(unsure) and not (over or contrary or unknown)
-    reasons = [*map(_failure, over[1:]), *_risks(unsure[risk_first:])]
+    wrong = found.impossible
+    risk_first = bool(unsure) and not (wrong or over or contrary or unknown or out)
+    reasons = [*wrong, *map(_failure, over[not wrong :]), *_risks(unsure[risk_first:])]
     # What an estimated drive survives is an interval in the table, and there are many of them.
     reasons += [_wear(part) for part in wearing if not part.joint.estimated_drive]
-    reasons += _gaps(found)
+    reasons += _told_gaps(gaps)
+    reasons += found.reducer_warnings
     reasons += found.doubts
     reasons += found.warnings
 
@@ -178,13 +204,18 @@ def judge(found: Assessment) -> Verdict:
             joint.worst_operation, joint.worst_pose)  # fmt: skip
         told = tuple(dict.fromkeys(line for line in reasons if line not in text))
         word = "Probably safe" if guess and status == "safe" else _SAID[status]
+        if status in ("safe", "limited"):
+            text = f"{_covered(found, gaps, wearing)}. {text}"
         headline = f"{word}. {text}."
         limit = part.limit if part else ""
         # Only of a part that is judged by its margin.
         ends = part.interval if part and not math.isnan(margin) else None
         return Verdict(status, governor, joint.name, margin, told, operation, pose, limit, headline,
-                       ends, guess)  # fmt: skip
+                       ends, guess, covers, gaps)  # fmt: skip
 
+    if wrong:
+        joint = worst[0].joint if worst else found.joints[0]
+        return made("cannot-be-told", f"The URDF cannot be right: {wrong[0]}", "input", joint, None)
     if over:
         part = over[0]
         return made("fails", _failure(part), part.governor, part.joint, part, part.margin)
@@ -192,6 +223,11 @@ def judge(found: Assessment) -> Verdict:
         part = contrary[0]
         text = f"{part.joint.name}: the shaft, by G Jp / l, {softer(part.joint.shaft_ratio)}"
         return made("cannot-be-told", text, "input", part.joint, part)
+    if out:
+        names = f"{', '.join(one.joint for one in out)} {'was' if len(out) == 1 else 'were'}"
+        of_rest = _of_the_rest([*wearing, *worst])
+        return made("cannot-be-told", f"{names} left out, though the blows load it all; {of_rest}",
+                    "input", worst[0].joint if worst else found.joints[0], None)  # fmt: skip
     if unknown:
         text = _unknown(unknown, [*wearing, *worst], whole=len(unknown) == len(found.joints))
         return made("cannot-be-told", text, "input", unknown[0], None)
@@ -317,7 +353,7 @@ def _wear(part: _Part) -> str:
 
 def _closest(worst: list[_Part]) -> str:
     first = worst[0]
-    text = f"No part fails or wears; the {first.name} comes closest, at {first.used}"
+    text = f"The {first.name} comes closest to a limit, at {first.used}"
     fatigue = next((part for part in worst if part.fatigue), first)
     if fatigue is first:
         return text
@@ -331,27 +367,78 @@ def _unknown(unknown: list[JointLife], known: list[_Part], *, whole: bool) -> st
             "No joint has a shaft or a reducer, so no life can be given; state them in the sidecar"
         )
     names = ", ".join(joint.name for joint in unknown)
-    rest = _wear(known[0]) if _wears(known[0]) else f"the {known[0].name} is at {known[0].used}"
-    return f"Neither a shaft nor a reducer is given for {names}; of the others {rest}"
+    return f"Neither a shaft nor a reducer is given for {names}; {_of_the_rest(known)}"
 
 
-def _gaps(found: Assessment) -> Iterator[str]:
-    """What was not assessed, and what the reducers' catalogues do not promise."""
-    for text, names in (
-        (
-            "no reducer is named for {}: it is not assessed",
-            [j.name for j in found.joints if is_drive(j.name) and not j.drive],
-        ),
-        (
-            "the reducer of {} is not assessed: its vibration from rest has no end",
-            [j.name for j in found.joints if j.drive and math.isnan(j.reducer_utilisation)],
-        ),
-        (
-            "whether the shaft of {} yields is not assessed: the S-N curve gives no static "
-            "strength, or the vibration from rest has no end",
-            [j.name for j in found.joints if j.worn == "shaft" and math.isnan(j.yield_utilisation)],
-        ),
-    ):
-        if names:
-            yield text.format(", ".join(names))
-    yield from found.reducer_warnings
+def _of_the_rest(known: list[_Part]) -> str:
+    """How the parts fare that were looked at, the worst of them first."""
+    if not known:
+        return "of the other joints no shaft and no reducer is known"
+    first = known[0]
+    rest = _wear(first) if _wears(first) else f"the {first.name} is at {first.used}"
+    return f"of the others {rest}"
+
+
+_PARTS = ("shaft", "reducer")
+
+
+def _gaps(found: Assessment) -> Iterator[NotAssessed]:
+    """What was not looked at."""
+    for joint in found.joints:
+        if not is_drive(joint.name):
+            continue
+        if joint.worn != "shaft":
+            yield NotAssessed(joint.name, "shaft", "none given")
+        elif math.isnan(joint.yield_utilisation):
+            why = "its S-N curve gives no static strength, or its vibration does not end"
+            yield NotAssessed(joint.name, "yield", why)
+        if not joint.drive:
+            yield NotAssessed(joint.name, "reducer", "none given")
+        elif math.isnan(joint.reducer_utilisation):
+            yield NotAssessed(joint.name, "reducer", "its vibration from rest does not end")
+    for out in found.left_out:
+        yield NotAssessed(out.joint, "joint", f"left rigid: it {out.why}")
+    for name, why in found.refused.items():
+        yield NotAssessed(name, "effort limit", f"not believed: {why}")
+
+
+def _lacking(gaps: tuple[NotAssessed, ...], part: str) -> list[str]:
+    """The joints of which a part was not looked at."""
+    return [gap.joint for gap in gaps if gap.part == part]
+
+
+def _told_gaps(gaps: tuple[NotAssessed, ...]) -> Iterator[str]:
+    """What was not looked at, a line for each kind and reason."""
+    said: dict[tuple[str, str], list[str]] = {}
+    for gap in gaps:
+        said.setdefault((gap.part, gap.why), []).append(gap.joint)
+    for (part, why), names in said.items():
+        told = ", ".join(names)
+        if part == "joint":
+            yield f"{told}: {why}"
+        elif part == "effort limit":
+            yield f"the effort limit of {told} is {why}"
+        else:
+            yield f"{part}{'s' * (part in _PARTS)} not checked in {told}: {why}"
+
+
+def _covered(found: Assessment, gaps: tuple[NotAssessed, ...], wearing: list[_Part]) -> str:
+    """What the verdict is about, and what it is not: "Shafts: unlimited life; ..."."""
+    told = []
+    worn = {part.joint.worn for part in wearing}
+    for part in _PARTS:
+        lacking = _lacking(gaps, part)
+        guess = part == "reducer" and any(joint.estimated_drive for joint in found.joints)
+        name = "drives (estimated)" if guess else f"{part}s"
+        ends = ("drive" if guess else part) in worn
+        held = "within their limits" if part == "reducer" and not guess else "unlimited life"
+        state = "a finite life" if ends else held
+        if len(lacking) == sum(is_drive(joint.name) for joint in found.joints):
+            if part == "shaft" and any(joint.estimated_drive for joint in found.joints):
+                continue  # the drive as a whole is judged
+            state = "not checked"
+        elif lacking:
+            state += f" (not checked in {', '.join(lacking)})"
+        told.append(f"{name}: {state}")
+    text = "; ".join(told)
+    return text[:1].upper() + text[1:]

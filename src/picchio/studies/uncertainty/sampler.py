@@ -22,9 +22,8 @@ from picchio.fatigue.uncertain_lives import Uncertain
 from picchio.model.effects.structure.springs.joint_stiffness import JointStiffness
 from picchio.model.many_poses import ManyPoses
 from picchio.model.model import Model
-from picchio.robot.annotations.flexibility import is_estimate
 from picchio.robot.flexible_robot import FlexibleRobot
-from picchio.robot.spread import Spread
+from picchio.robot.spread import Spread, is_estimate
 from picchio.robot.varied import robot_with
 from picchio.studies.rivet.pose import Rivet
 from picchio.studies.rivet.poses import curve_tables, raised, stacked

@@ -14,9 +14,9 @@ from picchio.fatigue.sn.curve import SNCurve
 from picchio.fatigue.sn.library import load_sn_curve
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.studies.assessment.backwards import Allowable, AllowableLoads
 from picchio.studies.assessment.method_comparison import Term
 from picchio.studies.assessment.result import Assessment
-from picchio.studies.backwards import Allowable, AllowableLoads
 from picchio.studies.comparison import listed
 from picchio.studies.envelopes import envelope
 from picchio.studies.tasks import Task
@@ -236,7 +236,7 @@ def assessment_report(
         gravity_stiffness: as in the assessment.
         sn_curve: as given to `assess`.
         scene: HTML of the 3-D scene, to be shown in the report; it adds its own size.
-        allowed: what a wanted life allows, of `picchio.studies.backwards`.
+        allowed: what a wanted life allows, of `picchio.studies.assessment.backwards`.
         spread: how sure the lives are, of `picchio.studies.uncertainty`.
         terms: the paper's method against this one, of `method_comparison`.
         cover: title, customer, author and logo, for the first page.

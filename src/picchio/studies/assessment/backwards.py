@@ -27,6 +27,7 @@ from picchio.fatigue.sn.library import DEFAULT_SN_CURVE, load_sn_curve
 from picchio.model.model import Model
 from picchio.robot.annotations.flexibility import estimate_notice
 from picchio.robot.drives.reducer import Reducer, all_reducers
+from picchio.robot.estimate.rigid import left_rigid
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.joint import Joint, Strength, is_drive
 from picchio.studies.assessment.verdict import SHAFT_TOLERANCE, Status, softer
@@ -155,7 +156,7 @@ class AllowableLoads(TableResult):
         held = 1.0 if self.held is None else self.held
         if False in told or held <= 1.0 - SURE:
             return False
-        return None if None in told or held < SURE else True
+        return None if None in told or held < SURE or self.contrary else True
 
     @property
     def yes(self) -> bool:
@@ -206,6 +207,15 @@ class AllowableLoads(TableResult):
         if self.estimated:
             return f"Probably: every part, as estimated, survives {wanted}{sure}. {self._force()}"
         return f"Yes: every part that is given survives {wanted}{sure}. {self._force()}"
+
+    @property
+    def force_told(self) -> str:
+        """The force that the life allows, in a few words."""
+        if math.isinf(self.force_factor):
+            return "any"
+        if (ends := self.intervals.get("force")) is not None:
+            return f"{told_ends(ends)} N in 80 % of the cases"
+        return f"{told_ends((self.force, self.force))} N"
 
     def _force(self) -> str:
         if math.isinf(self.force_factor):
@@ -296,6 +306,7 @@ def allowable(
     gravity_stiffness: bool | None = None,
     gravity_balanced: bool | None = None,
     reducers: Sequence[str | Path] = (),
+    thorough: bool = True,
 ) -> AllowableLoads:
     """Whether a task can be done for a target life, and what that life allows.
 
@@ -314,6 +325,7 @@ def allowable(
         gravity_stiffness: as in `assess`.
         gravity_balanced: as in `assess`.
         reducers: catalogues beside the shipped ones, to choose from.
+        thorough: False leaves out the hits, whose answer is then None, and draws fewer cases.
 
     Where a value of the robot has a spread (`FlexibleRobot.spreads`), a yes needs every part to
     hold in 90 % of the drawn cases, too: values, blows and the model's error vary as in
@@ -344,7 +356,8 @@ def allowable(
     ]
     named = [joint.reducer for joint in model.robot.flexible_joints if joint.reducer]
     catalogue = all_reducers(reducers) | {reducer.name: reducer for reducer in named}
-    search = _Backwards(model, task, rivets, survival, parts, sorted(catalogue.values(), key=_size))
+    order = sorted(catalogue.values(), key=_size)
+    search = _Backwards(model, task, rivets, survival, parts, order, thorough)
     joints = tuple(search.joint(k) for k, part in enumerate(parts) if is_drive(part.joint.name))
     factor = search.force_of_all(min(joint.force_factor for joint in joints))
     strongest = max(operation.excitation.peak_force for operation in task.operations)
@@ -359,7 +372,17 @@ def allowable(
         force_factor=factor,
         force=factor * strongest if strongest else math.inf,
         hits=search.hits_of_all(joints),
-        contrary="; ".join(part.contrary for part in parts if part.contrary),
+        contrary="; ".join(
+            [
+                *(str(one) for one in model.robot.findings if one.severity == "impossible"),
+                *(part.contrary for part in parts if part.contrary),
+                *(
+                    f"{one.joint} is left rigid, and the blows load it: it {one.why}"
+                    for one in left_rigid(model.robot)
+                    if one.moves_tool
+                ),
+            ]
+        ),
         steel=steel.name,
         held=held,
         intervals=intervals,
@@ -536,6 +559,7 @@ class _Backwards:
     survival: float | None
     parts: list[_Parts]
     order: list[Reducer]
+    thorough: bool
     known: dict[tuple[float, int | None], list[_Load]] = field(default_factory=dict)
 
     @cached_property
@@ -590,7 +614,7 @@ class _Backwards:
             survival=self.survival,
             force_factor=force,
             radius=math.nan if slide and part.joint.shaft is None else radius,
-            hits=self._most_hits(k) if moved and has_part else None,
+            hits=self._most_hits(k) if moved and has_part and self.thorough else None,
             life=self.task.rivets_per_pass / spent if spent else math.inf,
             met=not failing if has_part else None,
             most_rivets=self._most_rivets(k),
@@ -703,9 +727,12 @@ class _Backwards:
         found["peak_torque"] = torques
         if cases.cheap and strongest:
             near = factor if 0.0 < factor < math.inf else 1.0
-            factors = cases.force_factor(self.rivets, near)
+            factors = cases.force_factor(self.rivets, near, thorough=self.thorough)
             found["force"] = tuple(end * strongest for end in interval(factors))
-            if len({operation.hits_per_rivet for operation in self.task.operations}) == 1:
+            if (
+                self.thorough
+                and len({operation.hits_per_rivet for operation in self.task.operations}) == 1
+            ):
                 found["hits"] = self._hits_held(cases)
         else:
             notes.append(
@@ -736,7 +763,9 @@ class _Backwards:
         if bare:
             steel = self.parts[0].steel.name
             yield f"no shaft is given for {', '.join(bare)}: the radius is for {steel}"
-        if len({operation.hits_per_rivet for operation in self.task.operations}) != 1:
+        if not self.thorough:
+            yield "how many hits a rivet may take is searched for with --for-life only"
+        elif len({operation.hits_per_rivet for operation in self.task.operations}) != 1:
             yield "the operations differ in their hits a rivet, so no number of hits is given"
         none = [j.joint for j in joints if j.reducer is None and not math.isnan(j.radius)]
         if none:
