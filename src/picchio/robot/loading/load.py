@@ -131,7 +131,7 @@ def _estimate(robot: FlexibleRobot, known: Mapping[str, Any]) -> Sidecar | None:
             # The tool's frame was found without it.
             return estimated_sidecar(robot, **known).model_copy(update={"tool": None})
         except InputError as error:
-            if error.key in known:
+            if error.key in (*known, "joint"):
                 raise
             raise InputError(
                 f"no joint of this robot has a stiffness, and none can be estimated: {error}",
