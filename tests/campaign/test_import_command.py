@@ -127,8 +127,10 @@ def test_bad_input_leaves_nothing(folder):
     refused(done, folder, "record[0].file", ".parquet")
     done = picchio("import", "hit1.csv", "--mapping", "m.toml", "--to", "no/c", cwd=folder)
     refused(done, folder, "no such folder")
-    (folder / "hit1.csv").write_text("t,F\n0,1\n1,x\n2,3\n")
-    refused(picchio("import", "hit1.csv", *ok, cwd=folder), folder, "hit1.csv", "F, line 3", "'x'")
+    (folder / "hit1.csv").write_text("t,F\n0,a\n1,x\n2,3\n")
+    refused(
+        picchio("import", "hit1.csv", *ok, cwd=folder), folder, "hit1.csv", "'F'", "text", "'a'"
+    )
     (folder / "hit1.csv").write_text("t,F\n0,1\n1,2\n9,3\n")
     refused(picchio("import", "hit1.csv", *ok, cwd=folder), folder, "hit1.csv", "not even")
 

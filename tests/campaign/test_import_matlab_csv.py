@@ -1,6 +1,7 @@
 """MATLAB and CSV files into records, and every bad mapping."""
 
 import numpy as np
+import pandas
 import pytest
 
 from picchio.campaign.importing import isolated
@@ -108,7 +109,7 @@ BAD = {
     "a wrong time unit": (CSV_LAYOUT.replace('"ms"', '"mm"'), ["time.unit", "mm"]),
     "no such time": (CSV_LAYOUT.replace('"Zeit"', '"Zeiten"'), ["time.series", "Zeit"]),
     "one channel twice": (CSV_LAYOUT.replace("displacement.tool.x", "force"), ["force"]),
-    "text for numbers": (CSV_LAYOUT.replace('"Weg"', '"Text"'), ["Text", "line 3", "ok"]),
+    "text for numbers": (CSV_LAYOUT.replace('"Weg"', '"Text"'), ["Text", "text", "ok"]),
     "a key misspelt": (CSV_LAYOUT.replace("scale", "x").replace("remove", "remov"), ["remov"]),
     "a wrong sign": (CSV_LAYOUT.replace("remove = ", "sign = 2\nremove = "), ["sign"]),
     "no quiet time": (CSV_LAYOUT.replace("zero = 0.0005", ""), ["before zero"]),
@@ -116,7 +117,7 @@ BAD = {
         CSV_LAYOUT.replace("[source]", '[source]\nkind = "xls"'),
         ["source.kind", "csv"],
     ),
-    "the wrong decimal mark": (CSV_LAYOUT.replace('decimal = ","', ""), ["line 3", "0,0"]),
+    "the wrong decimal mark": (CSV_LAYOUT.replace('decimal = ","', ""), ["Zeit", "text", "0,0"]),
     "the time as a channel": (CSV_LAYOUT.replace('"force"', '"time"').replace("kN", "s"), ["time"]),
     "an odd record key": (CSV_LAYOUT + "[record]\npoze = 1\n", ["poze", "pose"]),
 }
@@ -170,11 +171,21 @@ def test_a_mat_file_that_kills_its_reader(tmp_path, signals, monkeypatch):
         read_raw(path)
 
 
-def test_a_version_7_3_file_is_named_as_such(tmp_path):
-    path = tmp_path / "new.mat"
-    path.write_bytes(b"MATLAB 7.3 MAT-file".ljust(116) + bytes(8) + b"\x00\x02IM" + b"\x89HDF\r\n")
-    with pytest.raises(InputError, match=r"7\.3"):
-        read_raw(path)
+def test_tables_structs_and_version_7_3(tmp_path, signals):
+    """As MATLAB writes them: `table` is an object of its own, 7.3 is HDF5."""
+    matio = pytest.importorskip("matio")
+    time, values = signals
+    frame = pandas.DataFrame({"t": time, "F": values[0], "who": ["a"] * time.size})
+    for version in ("v7", "v7.3"):
+        path = tmp_path / f"{version}.mat"
+        matio.save_to_mat(path, {"T": frame, "s": {"x": values[1][None]}, "fs": np.array([[2.0]])},
+                          version=version)  # fmt: skip
+        raw = read_raw(path)
+        assert (raw.channels["T.F"].values == values[0]).all()
+        assert (raw.channels["T.t"].values == time).all()
+        assert (raw.channels["s.x"].values == values[1]).all()
+        assert raw.scalars == {"fs": 2.0}
+        assert raw.texts["T.who"][0] == "a"
 
 
 def test_a_template_lists_every_series_and_reads_back(tmp_path, signals):

@@ -131,10 +131,6 @@ def test_tables_of_any_habit(tmp_path, habit):
 
 
 def test_a_refusal_quotes_the_row(tmp_path):
-    path = tmp_path / "log.csv"
-    path.write_text("time,F\n0,1\n1,2\n2,3,4\n3,4\n")
-    with pytest.raises(InputError, match=r"log\.csv.*line 4.*2 values"):
-        read_raw(path)
     (tmp_path / "rows.jsonl").write_text('{"t": 0}\n{"t": 1}\nhello\n')
     with pytest.raises(InputError, match=r"rows\.jsonl.*line 3.*hello"):
         read_raw(tmp_path / "rows.jsonl")
@@ -266,8 +262,9 @@ def test_lvm(tmp_path, signal, columns):
     np.testing.assert_allclose(raw.channels["Acc"].time, np.arange(50) * 5e-4, rtol=1e-12)
     assert raw.epoch == BEGIN
     path.write_text(path.read_text() + "1,0\tx\t3\n")
-    with pytest.raises(InputError, match=r"run\.lvm.*line 73.*x"):
-        read_raw(path)
+    raw = read_raw(path)
+    assert [c.values.size for c in raw.channels.values()] == [50, 51]
+    assert any("Force, 'x' in line 73: no number" in line for line in raw.told)
 
 
 def bag(path, signal, kind):
@@ -358,8 +355,12 @@ def test_several_runs_in_one_table_have_a_clock_each(tmp_path):
     path = tmp_path / "runs.csv"
     rows = [f"{run},{i / 100:.2f},{100 * run + i}\n" for run in (3, 7, 9) for i in range(40)]
     path.write_text("run,time,q1\n" + "".join(rows))
-    assert detection(path).lines[-1] == (
-        "no clock: 'time' is named as a time, but goes back in sample 41, from 0.39 to 0"
+    assert (
+        detection(path)
+        .lines[-1]
+        .startswith(
+            "no clock: 'time' is named as a time, but goes back in sample 41, from 0.39 to 0; "
+        )
     )
     rules = channel("q1", "position.a") + MOTION
     with pytest.raises(InputError, match=r"goes back in sample 41.*\[\[filter\]\]"):
@@ -379,20 +380,12 @@ def test_uneven_steps_are_told_with_their_average(tmp_path):
     )
 
 
-def test_stamps_in_ns_are_read_in_the_fast_way_digit_by_digit(tmp_path):
-    from picchio.campaign.importing.readers import read_csv
-
+def test_stamps_in_ns_are_read_digit_by_digit(tmp_path):
     path = tmp_path / "ns.csv"
     stamps = 1_772_323_200_000_000_001 + 2_000_003 * np.arange(300)
-    cells = [f"{s},{i % 2},{i * 0.5}\n" for i, s in enumerate(stamps)]
-    path.write_text("stamp,on,q1\n" + "".join(cells))
-    head, lines = ["stamp,on,q1\n"], cells
-    found = read_csv._fast(path, head, lines, read_csv.layout_of(path, None))
-    assert found is not None
-    assert (found.channels["stamp"].values == stamps).all()
-    for name, series in read_raw(path).channels.items():
-        assert (found.channels[name].values == series.values).all()
-        assert found.channels[name].values.dtype == series.values.dtype
+    path.write_text("stamp,on\n" + "".join(f"{s},{i % 2}\n" for i, s in enumerate(stamps)))
+    found = read_raw(path).channels["stamp"].values
+    assert found.dtype == np.int64 and (found == stamps).all()
 
 
 def test_dates_as_text_are_the_same_in_any_habit(tmp_path):

@@ -27,7 +27,7 @@ from picchio.core.dates import MISSING, is_moment, moments
 from picchio.core.errors import InputError
 from picchio.core.files import regular_file
 from picchio.core.toml import StrictModel
-from picchio.core.units import Conversion, conversion
+from picchio.core.units import Conversion, conversion, is_unit
 
 BLOCK = 1 << 17
 """Rows that are parsed at a time."""
@@ -101,6 +101,7 @@ class Left:
         text: the first of them, as it stands there.
         count: how many there are: lines, or cells.
         column: of the cells; None of whole lines.
+        word: what a row is called.
     """
 
     why: str
@@ -109,14 +110,16 @@ class Left:
     text: str
     count: int
     column: str | None = None
+    word: str = "line"
 
     @property
     def told(self) -> str:
         """In words."""
         text = self.text if len(self.text) <= 60 else self.text[:57] + "..."
-        where = f"{text!r} in line {self.line}" if text else f"empty in line {self.line}"
+        where = f"{text!r}" if text else "empty"
+        where += f" in {self.word} {self.line}"
         if self.count > 1:
-            what = "cells" if self.column is not None else "lines"
+            what = "cells" if self.column is not None else f"{self.word}s"
             where = f"{self.count} {what}, the first {where}"
         return f"left out: {'' if self.column is None else self.column + ', '}{where}: {self.why}"
 
@@ -195,15 +198,12 @@ class Names:
         return name if self._seen[name] == 1 else f"{name}#{self._seen[name]}"
 
 
-def read_table(
-    path: str | Path, layout: TextLayout | None = None, *, numbers: Sequence[str] = ()
-) -> Table:
+def read_table(path: str | Path, layout: TextLayout | None = None) -> Table:
     """A table of text, whole.
 
     Args:
         path: the file.
         layout: how it is written; told from its first lines where left out.
-        numbers: columns that are taken for numbers whatever they hold.
 
     Returns:
         its columns: of numbers, dates and text.
@@ -211,7 +211,7 @@ def read_table(
     Raises:
         InputError: missing, no text, or a table without a line of numbers.
     """
-    parts = list(table_blocks(path, layout, numbers=numbers))
+    parts = list(table_blocks(path, layout))
     if not parts:
         raise InputError("is empty", file=path)
     return joined(parts)
@@ -286,8 +286,7 @@ def joined(parts: Sequence[Table]) -> Table:
 
 
 def table_blocks(
-    path: str | Path, layout: TextLayout | None = None, size: int = BLOCK, *,
-    numbers: Sequence[str] = (),
+    path: str | Path, layout: TextLayout | None = None, size: int = BLOCK
 ) -> Iterator[Table]:  # fmt: skip
     """The same in blocks of rows, so that memory does not grow with the file.
 
@@ -297,7 +296,6 @@ def table_blocks(
         path: the file.
         layout: how it is written.
         size: rows of a block, about.
-        numbers: columns that are taken for numbers whatever they hold.
 
     Raises:
         InputError: as `read_table`.
@@ -310,10 +308,29 @@ def table_blocks(
     layout = layout.model_copy(update={"encoding": encoding})
     try:
         with open(source, encoding=encoding, errors="replace") as stream:
-            yield from _Reader(source, layout, told, set(numbers)).blocks(stream, size)
+            for _ in range(layout.skip_lines):
+                stream.readline()
+            yield from stream_blocks(stream, source, layout, size, layout.skip_lines + 1, told=told)
     except (LookupError, UnicodeError):
         raise InputError("is no encoding of text that is known", file=path, key="encoding",
                          value=encoding) from None  # fmt: skip
+
+
+def stream_blocks(
+    stream: IO[str], path: Path, layout: TextLayout, size: int = BLOCK, first: int = 1, *,
+    told: tuple[str, ...] = (),
+) -> Iterator[Table]:  # fmt: skip
+    """Blocks of a table that stands in a stream, from its header on.
+
+    Args:
+        stream: lines of text.
+        path: of its file, for messages.
+        layout: how it is written.
+        size: rows of a block, about.
+        first: number of the stream's first line in the file.
+        told: what there is to say of it.
+    """
+    yield from _Reader(path, layout, told).blocks(stream, size, first)
 
 
 def encoding_of(path: Path) -> str:
@@ -509,37 +526,29 @@ class _Sample:
 
 
 def are_units(cells: Sequence[str]) -> bool:
-    """Whether a line looks like one of units: short, and bracketed or known.
+    """Whether a line looks like one of units: short, and bracketed or units that are known.
 
     Args:
         cells: of the line.
     """
     short = [c.strip("[]()") for c in cells if c]
-    return bool(short) and all(len(c) <= 8 for c in short) and any(
-        c[0] + c[-1] in ("[]", "()")
-        or c.lower() in ("s", "ms", "us", "ns", "n", "kn", "rad", "deg", "v", "mv", "nm", "mm",
-                         "m/s^2", "m/s²", "g", "°")
-        for c in cells if c
+    return bool(short) and all(len(c) <= 12 for c in short) and any(
+        c[0] + c[-1] in ("[]", "()") or is_unit(c) for c in cells if c
     )  # fmt: skip
 
 
 class _Reader:
     """Parses a table block by block, and keeps what its first block shows."""
 
-    def __init__(
-        self, path: Path, layout: TextLayout, told: tuple[str, ...], numbers: set[str]
-    ) -> None:
-        self.path, self.layout, self.told, self.numbers = path, layout, told, numbers
+    def __init__(self, path: Path, layout: TextLayout, told: tuple[str, ...]) -> None:
+        self.path, self.layout, self.told = path, layout, told
         self.names: list[str] = []
         self.header: list[str] = []
         self.units: list[str | None] = []
         self.kinds: dict[str, str] = {}
         self.sep = layout.delimiter
 
-    def blocks(self, stream: IO[str], size: int) -> Iterator[Table]:
-        for _ in range(self.layout.skip_lines):
-            stream.readline()
-        first = self.layout.skip_lines + 1
+    def blocks(self, stream: IO[str], size: int, first: int) -> Iterator[Table]:
         head: list[str] = []
         wanted = self.layout.header + self.layout.units
         while sum(map(self._counts, head)) <= wanted and (line := stream.readline()):
@@ -690,8 +699,6 @@ class _Reader:
     def _column(self, index: int, name: str, cells: Any, lines: list[str]) -> Column:
         """A column of what its kind is, which its first block decides."""
         kind, unit = self.kinds.get(name), self.units[index]
-        if name in self.numbers:
-            kind = "number"
         values = cells.to_numpy() if cells.dtype.kind in "iufb" else None
         if values is not None and kind in (None, "number"):
             self.kinds[name] = "number"
@@ -704,15 +711,24 @@ class _Reader:
             cell.strip() if isinstance(cell, str) else self._cell(line, index)
             for cell, line in zip(cells.to_numpy(dtype=object), lines, strict=True)
         ]
-        found = _converted(name, text, (self.layout.decimal, self.layout.thousands), kind, unit)
+        found = typed(name, text, (self.layout.decimal, self.layout.thousands), kind, unit)
         self.kinds[name] = found.kind
         return found
 
 
-def _converted(
-    name: str, cells: list[str], habit: tuple[str, str], kind: str | None, unit: str | None
-) -> Column:
-    """Cells of text as what most of them are: numbers, dates, times of day, or text."""
+def typed(
+    name: str, cells: list[str], habit: tuple[str, str] = (".", ""), kind: str | None = None,
+    unit: str | None = None,
+) -> Column:  # fmt: skip
+    """Cells of text as what most of them are: numbers, dates, times of day, or text.
+
+    Args:
+        name: of the column.
+        cells: without blanks around them.
+        habit: decimal sign, sign between thousands.
+        kind: what they are, where that is known.
+        unit: of the numbers.
+    """
     made = [_LOGICAL.get(cell.lower(), cell) for cell in cells]
     number = _PATTERNS[habit].fullmatch
     there = np.array([number(cell) is not None for cell in made], bool)

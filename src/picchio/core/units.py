@@ -202,6 +202,15 @@ def conversion(unit: str, targets: tuple[str, ...]) -> tuple[str, Conversion]:
     raise InputError(problem, value=unit, choices=dict.fromkeys([*targets, *examples]))
 
 
+def is_unit(text: str) -> bool:
+    """Whether a text is a unit, of whatever.
+
+    Args:
+        text: as a person wrote it.
+    """
+    return _parse(_spelt(text)) is not None
+
+
 def _conversion(found: Any, wanted: Any) -> Conversion | None:
     """From one pint unit to another; None where they are no units of the same quantity."""
     registry = _registry()

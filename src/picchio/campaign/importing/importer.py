@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from picchio.campaign.campaign import Campaign, load_campaign
 from picchio.campaign.channels import TIME, parse_channel
-from picchio.campaign.importing.detect import implausible, told
+from picchio.campaign.importing.detect import implausible, rising, told
 from picchio.campaign.importing.isolated import blocks_isolated, read_isolated
 from picchio.campaign.importing.mapping import (
     ChannelTable,
@@ -21,15 +21,16 @@ from picchio.campaign.importing.mapping import (
     TimeTable,
     read_mapping,
 )
-from picchio.campaign.importing.raw import RawChannel, RawFile
-from picchio.campaign.importing.readers import read_csv, read_parquet
-from picchio.campaign.importing.resample import clocked, common_clock
+from picchio.campaign.importing.raw import RawChannel, RawFile, below
+from picchio.campaign.importing.readers import read_parquet
+from picchio.campaign.importing.resample import clocked, common_clock, told_apart
 from picchio.campaign.record import Record
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError, warn_user
 from picchio.core.files import locked, regular_file
 from picchio.core.provenance import provenance
 from picchio.core.results import Result
+from picchio.core.tables import TextLayout, read_table, table_blocks
 
 _ROOM = "picchio.campaign.importing.readers"
 _ISOLATED = {
@@ -41,7 +42,9 @@ _IN_BLOCKS = ("csv", "parquet", "mcap", "bag")
 ENDINGS = {".csv": "csv", ".txt": "csv", ".tsv": "csv", ".dat": "csv", ".uff": "uff",
             ".unv": "uff", ".mcap": "mcap", ".mat": "matlab", ".parquet": "parquet",
             ".bag": "bag", ".db3": "bag", ".lvm": "lvm", ".npz": "npz", ".jsonl": "json-lines",
-            ".ndjson": "json-lines"}  # fmt: skip
+            ".ndjson": "json-lines", ".json": "json-lines", ".npy": "npz"}  # fmt: skip
+_PACKED = {".zst": "zstd -d", ".zstd": "zstd -d", ".gz": "gunzip", ".xz": "unxz", ".zip": "unzip",
+           ".bz2": "bunzip2"}  # fmt: skip
 
 # s that an import waits for another one into the same campaign.
 _PATIENCE = 60.0
@@ -58,7 +61,10 @@ def kind_of(path: Path, mapping: Mapping | None = None) -> str:
     Raises:
         InputError: neither says.
     """
-    kind = (mapping.source.kind if mapping else None) or ENDINGS.get(path.suffix.lower())
+    first = parts_of(path)[0]
+    if tool := _PACKED.get(first.suffix.lower()):
+        raise InputError("is packed", file=path, hint=f"unpack it: {tool} {first}")
+    kind = (mapping.source.kind if mapping else None) or ENDINGS.get(first.suffix.lower())
     if kind is None:
         raise InputError("the kind of file is not known by its ending", file=path,
                          value=path.suffix, choices=ENDINGS,
@@ -66,11 +72,28 @@ def kind_of(path: Path, mapping: Mapping | None = None) -> str:
     return kind
 
 
+def parts_of(path: Path) -> list[Path]:
+    """The files of a log: itself, or those of the folder that a ROS 2 bag is, in their order.
+
+    Args:
+        path: the file or folder.
+
+    Raises:
+        InputError: neither.
+    """
+    if not path.is_dir():
+        return [regular_file(path)]
+    found = [p for p in path.iterdir() if p.suffix in (".mcap", ".db3", ".zstd", ".zst")]
+    if not found:
+        raise InputError("is a folder, not a file", file=path)
+    return sorted(found, key=lambda p: (len(p.name), p.name))
+
+
 def read_raw(path: str | Path, mapping: Mapping | None = None) -> RawFile:
     """The series of a foreign file.
 
     Args:
-        path: the file.
+        path: the file, or the folder of a ROS 2 bag.
         mapping: how it is written, and which time to take.
 
     Returns:
@@ -79,14 +102,40 @@ def read_raw(path: str | Path, mapping: Mapping | None = None) -> RawFile:
     Raises:
         InputError: missing, of an unknown kind, or not readable.
     """
-    source = regular_file(path)
-    kind = kind_of(source, mapping)
+    source = Path(path)
+    kind, files = kind_of(source, mapping), parts_of(source)
+    clock = mapping.time.model_dump(mode="json") if mapping else {}
     if kind == "csv":
-        raw = read_csv.read(source, mapping)
+        raw = RawFile.of_table(read_table(files[0], _layout(mapping)))
     else:
-        clock = mapping.time.model_dump(mode="json") if mapping else {}
-        raw = read_isolated(f"{_ROOM}.{_ISOLATED[kind]}", source, clock)
-    return _rows(raw, mapping) if mapping and mapping.filter else raw
+        raw = _one_log([read_isolated(f"{_ROOM}.{_ISOLATED[kind]}", f, clock) for f in files])
+    return told_apart(_rows(raw, mapping) if mapping else raw, _time(mapping))
+
+
+def _one_log(parts: list[RawFile]) -> RawFile:
+    """The files of a bag, one after the other in time, as one."""
+    first = parts[0]
+    channels: dict[str, RawChannel] = {}
+    for part in parts if len(parts) > 1 else ():
+        late = ((part.epoch or 0) - (first.epoch or 0)) * 1e-9
+        for name, c in part.channels.items():
+            assert c.time is not None
+            before = channels.get(name, replace(c, time=c.time[:0], values=c.values[:0]))
+            assert before.time is not None
+            channels[name] = replace(c, time=np.append(before.time, c.time + late),
+                                     values=np.append(before.values, c.values))  # fmt: skip
+    return replace(first, channels=channels or first.channels)
+
+
+def _layout(mapping: Mapping | None) -> TextLayout | None:
+    """How a table is written, where the mapping says so."""
+    if mapping is None or not mapping.source.stated:
+        return None
+    return mapping.source
+
+
+def _time(mapping: Mapping | None) -> TimeTable:
+    return mapping.time if mapping else TimeTable()
 
 
 def read_blocks(
@@ -105,16 +154,18 @@ def read_blocks(
     Raises:
         InputError: as `read_raw`.
     """
-    kind = kind_of(path, mapping)
+    kind, files = kind_of(path, mapping), parts_of(path)
     if kind not in _IN_BLOCKS:
         yield read_raw(path, mapping)
     elif kind == "csv":
-        yield from _tables(read_csv.blocks(path, mapping, size), mapping, size)
+        tables = table_blocks(files[0], _layout(mapping), size)
+        yield from _tables(map(RawFile.of_table, tables), mapping, size)
     elif kind == "parquet":
-        yield from _tables(read_parquet.blocks(path, None, size), mapping, size)
+        yield from _tables(read_parquet.blocks(path, size), mapping, size)
     else:
         clock = mapping.time.model_dump(mode="json") if mapping else {}
-        yield from blocks_isolated(f"{_ROOM}.{_ISOLATED[kind]}", path, clock, names)
+        for file in files:
+            yield from blocks_isolated(f"{_ROOM}.{_ISOLATED[kind]}", file, clock, names)
 
 
 def _tables(blocks: Iterator[RawFile], mapping: Mapping | None, size: int) -> Iterator[RawFile]:
@@ -123,20 +174,11 @@ def _tables(blocks: Iterator[RawFile], mapping: Mapping | None, size: int) -> It
     for raw in blocks:
         new = raw if mapping is None else _rows(raw, mapping)
         if held is not None and min(held.rows, new.rows) > 1 and held.rows + new.rows > size:
-            yield replace(held, before=before)
+            yield told_apart(replace(held, before=before), _time(mapping))
             before, held = before + held.rows, None
-        held = new if held is None else _below(held, new)
+        held = new if held is None else below([held, new])
     if held is not None:
-        yield replace(held, before=before)
-
-
-def _below(above: RawFile, raw: RawFile) -> RawFile:
-    """Two blocks of a table as one."""
-    channels = {
-        name: replace(c, values=np.concatenate([c.values, raw.channels[name].values]))
-        for name, c in above.channels.items() if name in raw.channels
-    }  # fmt: skip
-    return replace(above, channels=channels)
+        yield told_apart(replace(held, before=before), _time(mapping))
 
 
 def _rows(raw: RawFile, mapping: Mapping) -> RawFile:
@@ -151,8 +193,7 @@ def _rows(raw: RawFile, mapping: Mapping) -> RawFile:
     held = np.ones(sizes.pop(), bool)
     for entry in filters:
         held &= entry.passes(raw.channels[entry.series].values)
-    channels = {n: replace(c, values=c.values[held]) for n, c in raw.channels.items()}
-    return replace(raw, channels=channels)
+    return raw.at(held)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -185,11 +226,12 @@ class Detection(Result):
             "detected": list(self.lines),
             "series": [
                 {"name": c.name, "samples": c.values.size, "unit": c.unit, "channel": c.suggestion,
-                 "rate": None if c.time is None or c.time.size < 2 else
-                 1.0 / float(np.median(np.diff(c.time)))}
+                 "rate": None if c.time is None or c.time.size < 2 or np.ptp(c.time) == 0.0 else
+                 (c.time.size - 1) / float(np.ptp(c.time))}
                 for c in self.raw.channels.values()
             ],
-            "provenance": provenance([self.raw.path]),
+            "left_out": [asdict(one) for one in self.raw.left],
+            "provenance": provenance(parts_of(self.raw.path)),
         }  # fmt: skip
 
 
@@ -204,16 +246,20 @@ def detection(path: str | Path, mapping: Mapping | None = None) -> Detection:
         InputError: the file can't be read.
     """
     raw = read_raw(path, mapping)
-    try:
-        raw = clocked(raw, mapping.time if mapping else TimeTable())
-        lines = list(raw.detected)
-    except InputError as error:
-        lines = [*raw.detected, f"no clock: {error.problem}"]
     clocks: dict[bytes, str] = {}
-    for channel in raw.channels.values():
-        if channel.time is not None and channel.time.size > 1:
-            ns = np.rint(channel.time * 1e9).astype(np.int64)
-            clocks.setdefault(ns.tobytes(), f"{channel.name}: {', '.join(told(raw, ns, False))}")
+    try:
+        raw = clocked(raw, _time(mapping))
+        lines = list(raw.told)
+        for channel in raw.channels.values():
+            if channel.time is not None and channel.time.size > 1:
+                ns = np.rint(channel.time * 1e9).astype(np.int64)
+                if ns.tobytes() in clocks:
+                    continue
+                ns = ns[rising(ns, raw, channel.name, 1e-9)]
+                clocks[ns.tobytes()] = f"{channel.name}: {', '.join(told(ns, False))}"
+    except InputError as error:
+        hint = f"; {error.hint}" if error.hint else ""
+        lines = [*raw.told, f"no clock: {error.problem}{hint}"]
     if not any(line.startswith("rate ") for line in lines):
         lines += clocks.values()
     return Detection(raw, tuple(lines))
@@ -236,8 +282,17 @@ def joined(raw: RawFile, mapping: Mapping, mapping_file: Path | None = None) -> 
     """
     own = {s for _, _, parts, _ in mapping.entries for s in parts if s in raw.channels}
     own |= {entry.series for entry in mapping.filter if entry.series in raw.channels}
+    clock, _, series = (mapping.time.series or "").rpartition(":")
+    if table := next((t for t in mapping.join if t.name == clock), None):
+        # The stamps stand in another file, a row for a row.
+        path, rules = beside(raw.path, mapping, table)
+        stamps = read_raw(path, rules).channel(series, mapping=mapping_file, key="time.series")
+        stamps = replace(stamps, name=mapping.time.series or "", time=None)
+        raw = replace(raw, channels={stamps.name: stamps, **raw.channels})
     first = clocked(raw, mapping.time, mapping_file, own)
     for table in mapping.join:
+        if not any(s.startswith(f"{table.name}:") for _, _, p, _ in mapping.entries for s in p):
+            continue
         path, rules = beside(raw.path, mapping, table)
         other = clocked(read_raw(path, rules), table.time, mapping_file)
         if (first.epoch is None) != (other.epoch is None):
@@ -347,7 +402,7 @@ def _read_mapped(
         raise InputError(str(error), file=mapping_file or path) from None
     for record in records:
         record.check_samples()
-    lines = raw.detected
+    lines = raw.told
     if len(records) > 1:
         lines = (*lines, f"split at its gaps into {len(records)} records")
     return campaign, lines
@@ -484,7 +539,8 @@ def import_record(
             campaign at `to` says otherwise than the mapping.
         OutputError: the campaign cannot be written, or another process has been at it for a minute.
     """
-    source = regular_file(file)
+    source = Path(file)
+    files = parts_of(source)
     if mapping is None:
         raise InputError(
             "needs a mapping from its series to the campaign's channels",
@@ -495,7 +551,7 @@ def import_record(
     rules = Path(mapping)
     new, found = _read_mapped(source, read_mapping(rules), name, rules)
     added = len(new.records)
-    origin = provenance([source, rules])
+    origin = provenance([*files, rules])
     if to is None:
         return ImportedRecord(_noted(new, origin), origin, found, added)
     extra = {"mapping.toml": rules.read_bytes()}

@@ -15,7 +15,7 @@ import sys
 import time
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import IO, Any
@@ -27,6 +27,7 @@ from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError, PicchioWarning, warn_user
 from picchio.core.files import regular_file
 from picchio.core.processes import start_python
+from picchio.core.tables import Left
 
 _CHILD = "from picchio.campaign.importing.isolated import child; child(*sys.argv[1:])"
 
@@ -150,7 +151,10 @@ def _block(path: Path, told: dict[str, Any], pipe: _Pipe) -> RawFile:
         time_of = None if when is None else arrays[when]
         channels[entry["name"]] = RawChannel(values=arrays[at], time=time_of, **entry)
     taken = told["taken"] and datetime.fromisoformat(told["taken"])
-    return RawFile(path, told["kind"], channels, taken, told["epoch"], tuple(told["detected"]))
+    texts = {name: np.array(words, object)[arrays[at]] for name, at, words in told["texts"]}
+    return RawFile(path, told["kind"], channels, taken, told["epoch"], tuple(told["detected"]),
+                   texts=texts, scalars=told["scalars"],
+                   left=tuple(Left(**one) for one in told["left"]))  # fmt: skip
 
 
 def child(module: str, path: str, clock: str, names: str) -> None:
@@ -212,9 +216,18 @@ def _send(out: IO[bytes], raw: RawFile, said: Sequence[str]) -> None:
         elif clock is None or not np.array_equal(arrays[clock], channel.time):
             clock = len(arrays)  # a topic's series share their stamps
             arrays.append(channel.time)
-        about = {name: getattr(channel, name) for name in ("name", "unit", "suggestion", "note")}
+        about = {name: getattr(channel, name)
+                 for name in ("name", "unit", "suggestion", "note", "clock")}  # fmt: skip
         series.append(about | {"values": at, "time": clock})
+    texts = []
+    for name, cells in raw.texts.items():
+        words, codes = np.unique(cells.astype(str), return_inverse=True)
+        texts.append((name, len(arrays), words.tolist()))
+        arrays.append(codes)
     _write(out, {
+        "texts": texts,
+        "scalars": raw.scalars,
+        "left": [asdict(one) for one in raw.left],
         "kind": raw.kind,
         "taken": raw.taken and raw.taken.isoformat(),
         "epoch": raw.epoch,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Literal, get_args
@@ -11,46 +12,36 @@ from pydantic import AfterValidator, Field, model_validator
 
 from picchio.campaign.tables import FreeTable, SampleRate
 from picchio.core.arrays import BoolArray, FloatArray
+from picchio.core.tables import TextLayout
 from picchio.core.toml import Finite, FiniteVector, Positive, StrictModel, parse_toml
 
 FORMAT = "picchio-mapping/1"
 FileKind = Literal["csv", "uff", "mcap", "matlab", "parquet", "bag", "lvm", "npz", "json-lines"]
 KINDS: tuple[FileKind, ...] = get_args(FileKind)
+_BRIDGE = re.compile(r"bridge (\d+\.?\d*|\.\d+) ?(|m|u)s")
 
 
-def _one_letter(value: str) -> str:
-    if len(value) != 1:
-        raise ValueError("must be one letter")
-    return value
+class SourceTable(TextLayout):
+    """`[source]`: how the file is written; all but `kind` is for tables of text.
 
-
-class SourceTable(StrictModel):
-    """`[source]`: how the file is written; all but `kind` is for CSV.
-
-    Where no key but `kind` is given, the layout of a CSV file is detected.
+    Where no key but `kind` and `encoding` is given, the layout is told from the first lines.
 
     Attributes:
         kind: of file; told by its ending where left out.
-        delimiter: one letter between columns; a blank for any run of blanks.
-        decimal: sign of decimal numbers.
-        skip_lines: lines before the header (or the first sample).
-        header: whether a line names the columns; without one they are "1", "2", ...
-        units: whether a line below the header states the units.
-        comment: lines that begin with this are left out.
     """
 
     kind: FileKind | None = None
-    delimiter: Annotated[str, AfterValidator(_one_letter)] = ","
-    decimal: Literal[".", ","] = "."
-    skip_lines: Annotated[int, Field(ge=0, strict=True)] = 0
-    header: bool = True
-    units: bool = False
-    comment: str | None = None
 
     @property
     def stated(self) -> bool:
         """Whether the mapping says how a table is written."""
-        return bool(self.model_fields_set - {"kind"})
+        return bool(self.model_fields_set - {"kind", "encoding"})
+
+
+def _gaps(value: str) -> str:
+    if value not in ("split", "refuse") and not _BRIDGE.fullmatch(value):
+        raise ValueError('must be "split", "refuse" or "bridge" and a time, such as "bridge 20ms"')
+    return value
 
 
 Moment = datetime | Finite
@@ -61,17 +52,20 @@ class TimeTable(StrictModel):
     """`[time]`: where the clock comes from.
 
     Attributes:
-        series: the series that holds the time; found by its name where neither it nor `rate` is
-            given and the file has no clock of its own.
-        unit: of the series: s, ms, us, ns; told by the name, or by the size of the stamps, where
-            left out. Dates as text need none.
+        series: the series that holds the time, also one of a `[[join]]`; found by its name where
+            neither it nor `rate` is given and the file has no clock of its own.
+        unit: of the series: s, ms, us, ns, min, h, days, "100 ns", or from a date: "days since
+            1899" (spreadsheets), "days since year 0" (MATLAB), "100 ns since 1601" (Windows), "100
+            ns since year 1" (.NET); told by the name, or by the size of the stamps, where left
+            out. Dates as text need none.
         rate: Hz, sample rate where there is no time series, or the rate to resample to.
         zero: s, the time in the file that becomes t = 0 (the first edge of the first blow). With
             `rate` alone the first sample is at 0; UFF and MCAP files state the time of theirs;
             stamps that count from 1970 begin at 0 where no zero is given.
         resample: "linear" interpolates uneven time stamps onto an even clock of `rate`.
         stamp: MCAP and bags: the message header's stamp, or the time it was logged.
-        gaps: "split" makes a record of each stretch between dropouts, "refuse" takes none.
+        gaps: "split" makes a record of each stretch between dropouts, "refuse" takes none,
+            "bridge 20ms" draws straight lines over those up to so long.
         start: when a clock that does not count from 1970 was at zero.
         begin, end: s, or a date and time: what lies before or after is left out.
     """
@@ -82,10 +76,16 @@ class TimeTable(StrictModel):
     zero: Finite = 0.0
     resample: Literal["linear"] | None = None
     stamp: Literal["header", "log"] = "header"
-    gaps: Literal["split", "refuse"] = "split"
+    gaps: Annotated[str, AfterValidator(_gaps)] = "split"
     start: datetime | None = None
     begin: Moment | None = None
     end: Moment | None = None
+
+    @property
+    def bridge(self) -> float:
+        """s, the longest gap over which straight lines are drawn; 0 for none."""
+        found = _BRIDGE.fullmatch(self.gaps)
+        return 0.0 if found is None else float(found[1]) * {"": 1.0, "m": 1e-3, "u": 1e-6}[found[2]]
 
 
 class FilterTable(StrictModel):

@@ -17,7 +17,16 @@ from picchio.core.units import conversion
 
 _UNIT = re.compile(
     r"(?P<name>.*?\S)\s*[\[(<]\s*(?P<unit>[^\d\[\](<>][^\[\](<>]*(\([^()]*\)[^\[\](<>]*)?)[\])>]"
+    r"|(?P<quantity>.*?\S)\s+/\s+(?P<of>\S.*)"  # as ISO 80000 has it: quantity / unit
 )
+# What robots' logs call an array over all joints, by the channel; a commanded one is none of them.
+_ARRAYS = {
+    "position": re.compile(r"(.*[._/ ])?(q|qpos|pos|positions?|angles?|theta)", re.I),
+    "velocity": re.compile(r"(.*[._/ ])?(dq|qd|qdot|qvel|vel|velocity|velocities)", re.I),
+    "torque": re.compile(r"(.*[._/ ])?(tau|tau_j|torques?|efforts?)", re.I),
+}
+_COMMANDED = re.compile(r"target|desired|command|cmd|ref|goal|action", re.I)
+_PLACE = re.compile(r"(?P<array>.*?[^\d(\[_.])[(\[_.]?(?P<place>\d+)[)\]]?")
 _JOINT = re.compile(r"joint", re.I)
 _OF_JOINTS = ("position", "velocity", "torque", "temperature")
 # rad: a joint that turns further is hardly told in rad.
@@ -65,10 +74,11 @@ def named(
     own = all(channel.time is not None for channel in raw.channels.values())
     time = None if own else clock(raw)
     found: list[Named] = []
+    places = _of_joints(list(raw.channels), list(joints or ()))
     for channel in raw.channels.values():
         if time is not None and channel.name == time.series:
             continue
-        one = _one(channel, joints, frames)
+        one = _one(channel, joints, frames, places.get(channel.name))
         first = next((x.series for x in found if one.to and x.to == one.to), None)
         if first is not None:
             one = Named(one.series, "", one.unit, f"{first} is {one.to} already")
@@ -76,12 +86,30 @@ def named(
     return found
 
 
+def _of_joints(names: list[str], joints: list[str]) -> dict[str, str]:
+    """The channels of series that are an array over all joints, in the robot's order."""
+    arrays: dict[str, dict[int, str]] = {}
+    for name in names:
+        if (parts := _PLACE.fullmatch(name)) and not _COMMANDED.search(name):
+            arrays.setdefault(parts["array"], {})[int(parts["place"])] = name
+    found: dict[str, str] = {}
+    for array, places in arrays.items():
+        kind = next((kind for kind, word in _ARRAYS.items() if word.fullmatch(array)), None)
+        if kind and joints and sorted(places) in (
+            list(range(len(joints))), list(range(1, len(joints) + 1))
+        ):  # fmt: skip
+            ordered = (name for _, name in sorted(places.items()))
+            found |= {n: f"{kind}.{j}" for n, j in zip(ordered, joints, strict=True)}
+    return found
+
+
 def _one(
-    channel: RawChannel, joints: Collection[str] | None, frames: Collection[str] | None
-) -> Named:
+    channel: RawChannel, joints: Collection[str] | None, frames: Collection[str] | None,
+    place: str | None,
+) -> Named:  # fmt: skip
     parts = _UNIT.fullmatch(channel.name.strip())
-    name = parts["name"] if parts else channel.name.strip()
-    unit = channel.unit or (parts["unit"].strip() if parts else None)
+    name = (parts["name"] or parts["quantity"]) if parts else channel.name.strip()
+    unit = channel.unit or ((parts["unit"] or parts["of"]).strip() if parts else None)
     known = (*LOG_KINDS, *kinds())
     if unit is not None and not _fits(unit, known):
         return Named(channel.name, "", None, f"{unit!r} is no unit of a channel")
@@ -92,6 +120,8 @@ def _one(
         wanted, why = f"{_reading(unit, known)}.{name}", "named as a joint"
     elif joints is not None and channel.suggestion is not None:
         wanted, why = channel.suggestion, "as its message says"
+    elif place is not None:
+        wanted, why = place, "by its place in an array over all joints"
     try:
         to, convert = parse_channel(wanted, unit, known)
     except InputError:

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
+import pandas
 
 from picchio.campaign.clock import TOLERANCE, not_seconds
 from picchio.campaign.importing import detect
 from picchio.campaign.importing.mapping import FilterTable, TimeTable
 from picchio.campaign.importing.raw import RawChannel, RawFile
-from picchio.core.arrays import BoolArray, FloatArray
+from picchio.core.arrays import BoolArray, FloatArray, IndexArray
+from picchio.core.dates import nanoseconds
 from picchio.core.errors import InputError, warn_user
-from picchio.core.units import conversion
+from picchio.core.tables import Left
 
-# A hole of more usual steps than this is a dropout, over which nothing may be drawn.
-_LARGEST_GAP = 5.0
 # Straight lines between stamps hold nothing that is this many times as fast.
 _FASTER = 20.0
 # A stated rate that is off by more than this from the stamps' is told.
@@ -32,6 +31,8 @@ def clocked(
 ) -> RawFile:
     """The file with a time for every series, s, and what its clock is.
 
+    A row without a stamp, or with that of the row before, is left out and told.
+
     Args:
         raw: the file.
         asked: the mapping's `[time]`.
@@ -44,66 +45,55 @@ def clocked(
     wanted = set(raw.channels) if names is None else names & set(raw.channels)
     own = all(raw.channels[name].time is not None for name in wanted)
     lines, epoch = list(raw.detected), raw.epoch
-    time: FloatArray | None = None
+    if raw.clock is not None and raw.clock == asked.series:  # its stamps have been given out
+        asked = asked.model_copy(update={"series": None, "unit": None})
     found = None if own and asked.series is None else detect.clock(raw, asked.series)
-    needed = asked.rate is None and not own
+    single = None if own or asked.series or found else detect.of_scalars(raw.scalars)
+    rate, start = asked.rate, 0.0
     if asked.series is not None:
         raw.channel(asked.series, mapping=mapping, key="time.series")
-    elif found is not None and asked.rate is not None and asked.resample is None:
+    elif found is not None and rate is not None and asked.resample is None:
         # A column without a name that ascends may be anything.
-        rate = 1.0 / (_step(raw, found) or np.inf)
-        if abs(rate / asked.rate - 1.0) > _OFF and not found.series.isdigit():
-            warn_user(f"{raw.path}: [time] rate is {asked.rate:g} Hz, the stamps in "
-                      f"{found.series!r} tell {rate:.6g} Hz")  # fmt: skip
+        stamps = detect.known(raw.channels[found.series].values)
+        step = float(np.median(np.diff(stamps))) * detect.UNITS[found.unit][0] * 1e-9
+        # Stamps that mostly repeat are too coarse to tell.
+        if step > 0.0 and abs(1.0 / step / rate - 1.0) > _OFF and not found.series.isdigit():
+            warn_user(f"{raw.path}: [time] rate is {rate:g} Hz, the stamps in "
+                      f"{found.series!r} tell {1.0 / step:.6g} Hz")  # fmt: skip
         found = None
-    if asked.series is not None or needed or found is not None:
+    elif single is not None and rate is None:
+        rate, start, line = single
+        lines.append(line)
+    time: FloatArray | None = None
+    if asked.series is not None or found is not None or (rate is None and not own):
         if asked.unit is None or asked.series is None:
             found = detect.require(found, raw)
-        name = asked.series or (found.series if found else "")
-        if asked.unit is None:
-            assert found is not None
-            unit, dates = found.unit, found.dates
+            name, unit = found.series, found.unit
             lines.append(f"time in {name!r}, unit {unit}, {found.why}")
         else:
-            try:
-                scale = conversion(asked.unit, ("s",))[1].scale
-            except InputError as error:
-                raise error.placed(file=mapping, key="time.unit") from None
-            unit = min(detect.SCALES, key=lambda u: abs(np.log(detect.SCALES[u] / scale)))
-            if not np.isclose(detect.SCALES[unit], scale, rtol=1e-6):
-                raise InputError("is no unit of stamps", file=mapping, key="time.unit",
-                                 value=asked.unit, choices=detect.SCALES)  # fmt: skip
-            dates = _counts(raw.channels[name], unit)
+            name, unit = asked.series, _unit(asked.unit, mapping)
         stamps = raw.channels[name].values
-        if stamps.size < 2:
-            raise InputError("holds fewer than two samples", file=raw.path, key=name)
-        known = np.isfinite(stamps) if stamps.dtype.kind == "f" else np.ones(stamps.size, bool)
-        rises = np.diff(stamps) > 0
-        if not known.all() or not rises.all():
-            bad = int(np.flatnonzero(~(rises & known[1:] & known[:-1]))[0]) + 1
-            raise InputError(f"the stamps do not ascend (sample {bad + 1})", file=raw.path,
-                             key=name, value=float(stamps[bad]))  # fmt: skip
-        if dates:
-            ns = detect.ns_of(stamps, unit)
-            epoch = int(ns[0])
-            time = (ns - ns[0]) * 1e-9
-            lines += detect.told(raw, ns, True)
-        else:
-            scale = detect.SCALES[unit]
-            time = stamps * 1.0 if scale == 1.0 else stamps * scale
-            step = float(np.median(np.diff(time)))
-            if problem := not_seconds(time[0], step, scale):
-                raise InputError(problem, file=raw.path, key=name)
-            lines += detect.told(raw, np.rint((time - time[0]) * 1e9).astype(np.int64), False)
+        scale = detect.UNITS[unit][0] * 1e-9
+        kept = detect.rising(stamps, raw, name, scale)
+        if not kept.all():
+            raw = _without(raw, kept)
+            stamps = stamps[kept]
+        time, begin = _times(stamps, unit)
+        if begin is not None:
+            epoch = begin
+        elif problem := not_seconds(time[0], float(np.median(np.diff(time))), scale):
+            raise InputError(problem, file=raw.path, key=name)
+        ns = np.rint((time - time[0]) * 1e9).astype(np.int64)
+        lines += detect.told(ns + (begin or 0), begin is not None)
     if asked.start is not None and epoch is None:
-        epoch = detect.nanoseconds(asked.start)
+        epoch = nanoseconds(asked.start)
     channels = dict(raw.channels)
     for name in wanted:
         entry = channels[name]
         stamp = time if time is not None else entry.time
         if stamp is None:
-            assert asked.rate is not None
-            stamp = (raw.before + np.arange(entry.values.size)) / asked.rate
+            assert rate is not None
+            stamp = start + (raw.before + np.arange(entry.values.size)) / rate
         if stamp.size != entry.values.size:
             raise InputError(f"has {entry.values.size} samples and its clock {stamp.size}",
                              file=raw.path, key=name)  # fmt: skip
@@ -114,19 +104,101 @@ def clocked(
     return replace(raw, channels=channels, taken=taken, epoch=epoch, detected=tuple(lines))
 
 
-def _step(raw: RawFile, found: detect.FoundClock) -> float:
-    """s, the usual step of a clock."""
-    return float(np.median(np.diff(raw.channels[found.series].values))) * detect.SCALES[found.unit]
+def _unit(asked: str, mapping: Path | None) -> str:
+    """The unit of stamps that `[time] unit` names."""
+    if (unit := detect.unit_of(asked)) is None:
+        raise InputError("is no unit of stamps", file=mapping, key="time.unit", value=asked,
+                         choices=detect.UNITS)  # fmt: skip
+    return unit
 
 
-def _counts(channel: RawChannel, unit: str) -> bool:
-    """Whether stamps in this unit count from 1970."""
-    # Whole numbers without end: stamps in ms that are said to be s are beyond what 64 bits hold.
-    first = channel.values[:1].tolist()
-    factor = round(detect.SCALES[unit] * 1e9)
-    return bool(first) and math.isfinite(first[0]) and (
-        detect._DATES[0] <= first[0] * factor <= detect._DATES[1]
-    )  # fmt: skip
+def _without(raw: RawFile, kept: BoolArray) -> RawFile:
+    """The rows of a table that have a stamp of their own; the others are told."""
+    gone = np.flatnonzero(~kept)
+    series = sum(c.time is None for c in raw.channels.values())
+    left = Left("no stamp later than the one before", gone.size * series, int(gone[0]) + 1, "",
+                gone.size, None, "sample")  # fmt: skip
+    return replace(raw.at(kept), left=(*raw.left, left))
+
+
+def told_apart(raw: RawFile, asked: TimeTable) -> RawFile:
+    """A long table as what it is: a series for each sensor that a column names.
+
+    Such a column changes from row to row, or the stamps go back where it changes; those of each
+    sensor ascend. A series of it is named `value(sensor)`, and has its stamps.
+
+    Args:
+        raw: a table, before its clock is asked for.
+        asked: the mapping's `[time]`.
+    """
+    if any(c.time is not None for c in raw.channels.values()) or raw.rows < 3:
+        return raw
+    found = detect.clock(raw, asked.series, any_order=True)
+    if found is not None and found.other is not None and asked.unit is None:
+        return raw
+    stamps = None if found is None else raw.channels[found.series].values
+    keys = [(name, *pandas.factorize(cells)) for name, cells in raw.texts.items()]
+    if stamps is not None and not _rises(stamps):
+        keys += [
+            (name, *pandas.factorize(c.values)) for name, c in raw.channels.items()
+            if c.values.dtype.kind == "f" and (c.values % 1 == 0).all() and c.values is not stamps
+        ]  # fmt: skip
+    for name, codes, words in keys:
+        mixed = 2 * int((codes[1:] != codes[:-1]).sum()) > codes.size
+        if not 1 < len(words) <= raw.rows // 2:
+            continue
+        among = [np.flatnonzero(codes == k) for k in range(len(words))]
+        if stamps is not None:
+            # Runs one below the other are no sensors, unless they have names.
+            stacked = name in raw.texts and not _rises(stamps)
+            if not (mixed or stacked) or not all(_rises(stamps[rows]) for rows in among):
+                continue
+        elif not mixed:
+            continue
+        return _told_apart(raw, name, [str(w) if isinstance(w, str) else f"{w:g}" for w in words],
+                           among, found, asked)  # fmt: skip
+    return raw
+
+
+def _told_apart(
+    raw: RawFile, name: str, words: list[str], among: list[IndexArray],
+    found: detect.FoundClock | None, asked: TimeTable,
+) -> RawFile:  # fmt: skip
+    """The table with a series for each word of a column, each with its own rows and stamps."""
+    lines = [*raw.detected, f"{name!r} tells {len(words)} series apart: {', '.join(words[:10])}"]
+    time: FloatArray | None = None
+    epoch = raw.epoch
+    if found is not None:
+        unit = _unit(asked.unit, None) if asked.unit else found.unit
+        time, epoch = _times(raw.channels[found.series].values, unit)
+        lines.append(f"time in {found.series!r}, unit {unit}, {found.why}")
+        among = [r[detect.there(raw.channels[found.series].values[r])] for r in among]
+    channels: dict[str, RawChannel] = {}
+    for key, c in raw.channels.items():
+        if key in (name, found and found.series):
+            continue
+        for word, rows in zip(words, among, strict=True):
+            channels[f"{key}({word})"] = replace(
+                c, name=f"{key}({word})", values=c.values[rows],
+                time=None if time is None else time[rows],
+            )  # fmt: skip
+    texts = {key: cells for key, cells in raw.texts.items() if key != name}
+    return replace(raw, channels=channels, texts=texts, detected=tuple(lines), epoch=epoch,
+                   clock=None if found is None else found.series)  # fmt: skip
+
+
+def _times(stamps: FloatArray, unit: str) -> tuple[FloatArray, int | None]:
+    """Stamps in s, from the first where they count from a date; that one then, ns from 1970."""
+    if not detect.dated(stamps, unit):
+        scale = detect.UNITS[unit][0] * 1e-9
+        return stamps * (1.0 if unit == "s" else scale), None
+    ns = detect.ns_of(stamps, unit)
+    begin = int(ns[detect.there(stamps)][0])
+    return (ns - begin) * 1e-9, begin
+
+
+def _rises(stamps: FloatArray) -> bool:
+    return bool((np.diff(detect.known(stamps)) > 0).all())
 
 
 def taken_samples(
@@ -159,7 +231,7 @@ def taken_samples(
             if raw.epoch is None:
                 raise InputError("the file states no date; give s in its own time", file=mapping,
                                  key=f"time.{key}", value=str(moment))  # fmt: skip
-            moment = (detect.nanoseconds(moment) - raw.epoch) * 1e-9
+            moment = (nanoseconds(moment) - raw.epoch) * 1e-9
         # To the nanosecond: a block of a log counts from its own beginning.
         ns, limit = np.rint(series.time * 1e9), np.rint(moment * 1e9)
         kept = kept & ((ns >= limit) if after else (ns <= limit))
@@ -214,10 +286,11 @@ def common_clock(
             stamp, values = stamp[take], values[take]
         if stamp.size < 2:
             raise InputError("holds fewer than two samples", file=file, key=entry.name)
-        if not np.isfinite(stamp).all() or not (np.diff(stamp) > 0.0).all():
-            bad = int(np.flatnonzero(~(np.diff(stamp) > 0.0))[0]) + 1
-            raise InputError(f"the stamps do not ascend (sample {bad + 1})", file=file,
-                             key=entry.name)  # fmt: skip
+        on = detect.rising(stamp, raw, entry.name)
+        if not on.all():
+            stamp, values = stamp[on], values[on]
+            warn_user(f"{file}: {entry.name}: left out: {(~on).sum()} samples, the first sample "
+                      f"{int((~on).argmax()) + 1}: no stamp later than the one before")  # fmt: skip
         if problem := not_seconds(stamp[0] - zero, float(np.median(np.diff(stamp)))):
             raise InputError(problem, file=file, key=asked.series or entry.name)
         whole.append(stamp)
@@ -242,6 +315,8 @@ def common_clock(
             warn_user(f"{file}: the samples between {begin:.6g} s and {end:.6g} s are left out: "
                       "fewer than two lie between dropouts")  # fmt: skip
             continue
+        if asked.resample is None and asked.bridge:
+            cut[0], parts = _bridged(cut[0], parts, file)
         if asked.resample is None:
             if (jitter := _jitter(cut[0])) > TOLERANCE:
                 raise InputError(f"the clock is not even (by {jitter:.2g} steps)", file=file,
@@ -270,7 +345,8 @@ def _stretches(
         if stamp is stamps[0] and entry is not series[0]:
             continue
         steps = np.diff(stamp)
-        gaps = np.flatnonzero(steps > _LARGEST_GAP * np.median(steps))
+        longest = max(detect.LARGEST_GAP * float(np.median(steps)), asked.bridge)
+        gaps = np.flatnonzero(steps > longest)
         # What a clock is uneven by is no dropout where no resampling is asked for.
         if stamp.size < 10:
             gaps = gaps[:0]
@@ -282,6 +358,27 @@ def _stretches(
         own = list(zip(edges[::2], edges[1::2], strict=True))
         found = [(max(a, c), min(b, d)) for a, b in found for c, d in own if max(a, c) <= min(b, d)]
     return found
+
+
+def _bridged(
+    stamp: FloatArray, series: list[FloatArray], file: Path
+) -> tuple[FloatArray, list[FloatArray]]:
+    """Missing samples of an even clock, drawn by straight lines; what is there stays as it is."""
+    step = float(np.median(np.diff(stamp)))
+    # Stamps are rounded: over many steps the mean is nearer.
+    count = np.rint(np.diff(stamp) / step).sum()
+    step = (stamp[-1] - stamp[0]) / count if count else step
+    at = np.rint((stamp - stamp[0]) / step).astype(np.int64)
+    even = stamp[0] + np.arange(at[-1] + 1) * step
+    missing = even.size - stamp.size
+    if np.abs(stamp - even[at]).max() > TOLERANCE * step or not missing:
+        return stamp, series
+    clock, drawn = even.copy(), [np.interp(even, stamp, v) for v in series]
+    clock[at] = stamp
+    for values, own in zip(drawn, series, strict=True):
+        values[at] = own
+    warn_user(f"{file}: {missing} missing samples of {even.size} are bridged by straight lines")
+    return clock, drawn
 
 
 def _jitter(time: FloatArray) -> float:

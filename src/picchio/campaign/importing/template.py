@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from picchio.campaign.channels import LOG_KINDS, patterns
-from picchio.campaign.importing.detect import clock, layout
+from picchio.campaign.importing.detect import clock, rate_and_gaps
 from picchio.campaign.importing.importer import read_raw
 from picchio.campaign.importing.mapping import FORMAT, TimeTable
 from picchio.campaign.importing.named import Named, named
@@ -18,6 +18,7 @@ from picchio.campaign.importing.raw import RawChannel, RawFile
 from picchio.campaign.importing.resample import clocked
 from picchio.core.errors import InputError
 from picchio.core.files import write_text
+from picchio.core.tables import TextLayout, sniffed
 
 
 def write_mapping(
@@ -66,7 +67,7 @@ def mapping_template(raw: RawFile, known: Sequence[Named] | None = None) -> str:
         "",
         "[source]",
         f'kind = "{raw.kind}"',
-        *(_csv_layout(raw) if raw.kind == "csv" else ()),
+        *(_layout(raw) if raw.kind == "csv" else ()),
         "",
         "[time]",
         *times,
@@ -98,36 +99,47 @@ def mapping_template(raw: RawFile, known: Sequence[Named] | None = None) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _csv_layout(raw: RawFile) -> list[str]:
-    found = layout(raw.path)
-    lines = [f"delimiter = {_quoted(found.delimiter)}", f'decimal = "{found.decimal}"']
-    if found.skip_lines:
-        lines.append(f"skip_lines = {found.skip_lines}")
-    if not found.header:
-        lines.append("header = false")
-    if found.units:
-        lines.append("units = true")
-    return lines + ([f"comment = {_quoted(found.comment)}"] if found.comment else [])
+def _layout(raw: RawFile) -> list[str]:
+    found = sniffed(raw.path)[0]
+    usual = dict(TextLayout(encoding="utf-8-sig")) | {"delimiter": "", "decimal": ""}
+    return [f"{key} = {_quoted(value)}" for key, value in found if value != usual[key]]
 
 
 def _time(raw: RawFile) -> tuple[list[str], tuple[str, ...]]:
     """The lines of `[time]`, and what was detected."""
-    if any(channel.time is not None for channel in raw.channels.values()):
-        return ["# the file's own stamps are used",
-                '# resample = "linear"      # where they are uneven; then a rate, in Hz',
-                "# rate = ..."], raw.detected  # fmt: skip
-    found = clock(raw)
-    if found is None:
-        return [
-            '# series = "..."           # which holds the time; or',
-            "# rate = ...               # Hz: no series is named as a time, so it must be said",
-        ], raw.detected
+    offered = [
+        '# resample = "linear"      # where stamps are uneven or series have their own; then',
+        "# rate = ...               # Hz",
+        '# gaps = "bridge 20ms"     # draws lines over gaps of up to 20 ms; else "split"',
+    ]
+    own = [channel.time for channel in raw.channels.values() if channel.time is not None]
+    if own and raw.clock is None:
+        return ["# the file's own stamps are used", *offered], raw.told
     try:
-        told = clocked(raw, TimeTable(series=found.series, unit=found.unit), names=set()).detected
+        found = None if own else clock(raw)
+        made = clocked(raw, TimeTable(), names=None)
+        told, rate = made.told, _rate(made)
+        if rate:
+            offered[1] = f"# rate = {rate}".ljust(27) + "# Hz: as the stamps come"
     except InputError as error:
-        told = (*raw.detected, f"the clock is not taken: {error.problem}")
+        told = (*raw.told, f"the clock is not taken: {error.problem}")
+    if raw.clock is not None:
+        return [f"series = {_quoted(raw.clock)}", *offered], told
+    if found is None:
+        return ['# series = "..."           # which holds the time; or',
+                "# rate = ...               # Hz: no series is named as a time, so it must be said",
+                ], told  # fmt: skip
     lines = [f"series = {_quoted(found.series)}", f'unit = "{found.unit}"   # {found.why}']
-    return lines, told
+    return [*lines, *offered], told
+
+
+def _rate(raw: RawFile) -> str:
+    """The rate of the first series, Hz."""
+    time = next(iter(raw.channels.values())).time
+    if time is None or time.size < 2:
+        return ""
+    rate = rate_and_gaps(np.rint((time - time[0]) * 1e9).astype(np.int64))[0]
+    return f"{rate:.6g}" if "e" in f"{rate:.6g}" else f"{float(f'{rate:.6g}')}"
 
 
 def _channel(channel: RawChannel, known: Named | None) -> list[str]:
@@ -151,6 +163,6 @@ def _channel(channel: RawChannel, known: Named | None) -> list[str]:
     return [about + note + why, *(f"# {line}" for line in lines)]
 
 
-def _quoted(text: str) -> str:
-    """A TOML basic string."""
-    return json.dumps(text, ensure_ascii=False)
+def _quoted(value: str | bool | int) -> str:
+    """A value as TOML writes it."""
+    return json.dumps(value, ensure_ascii=False)

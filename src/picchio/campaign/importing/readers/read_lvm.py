@@ -5,17 +5,31 @@ Source: National Instruments, "Specification for the LabVIEW Measurement File (.
 
 from __future__ import annotations
 
+import io
+import itertools
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from picchio.campaign.importing.detect import moment
 from picchio.campaign.importing.isolated import Limits
-from picchio.campaign.importing.raw import Names, RawChannel, RawFile
+from picchio.campaign.importing.raw import RawChannel, RawFile
+from picchio.core.arrays import FloatArray
+from picchio.core.dates import moment
 from picchio.core.errors import InputError
-from picchio.core.files import read_bytes
+from picchio.core.files import regular_file
+from picchio.core.tables import (
+    Left,
+    Names,
+    Table,
+    TextLayout,
+    encoding_of,
+    gathered,
+    joined,
+    read_table,
+    stream_blocks,
+)
 
 LIMITS = Limits(memory_a_byte=128.0)
 _END = "***End_of_Header***"
@@ -25,111 +39,94 @@ _LARGEST = 1 << 30
 def read(path: Path, clock: Mapping[str, Any]) -> RawFile:
     """Every channel, with the times of its X column, or X0 and Delta_X where there is none.
 
-    Segments follow one another; each must have the channels of the first.
+    Segments follow one another; each must have the channels of the first. A file without LabVIEW's
+    header is read as any table.
 
     Args:
         path: the file.
         clock: the mapping's `[time]`.
 
     Raises:
-        InputError: no .lvm file, a row that is no row of numbers, segments that differ.
+        InputError: no table, or segments that differ.
     """
-    content = read_bytes(path, limit=_LARGEST)
-    try:
-        lines = content.decode("utf-8-sig").splitlines()
-    except UnicodeDecodeError:  # what LabVIEW writes where a comment has umlauts
-        lines = content.decode("cp1252", errors="replace").splitlines()
+    encoding = encoding_of(regular_file(path, limit=_LARGEST))
+    lines = path.read_text(encoding, errors="replace").splitlines()
     if not lines or not lines[0].startswith("LabVIEW Measurement"):
-        raise InputError("is no LabVIEW measurement file", file=path,
-                         value=lines[0][:60] if lines else "")  # fmt: skip
-    try:
-        end = lines.index(next(x for x in lines if x.strip() == _END))
-    except StopIteration:
-        raise InputError(f"has no {_END}", file=path) from None
-    separator = "," if any(x.lower().startswith("separator") and "comma" in x.lower()
-                           for x in lines[:end]) else "\t"  # fmt: skip
-    said = dict(line.split(separator, 1) for line in lines[:end] if separator in line)
-    decimal = said.get("Decimal_Separator", ".").strip() or "."
-    columns = said.get("X_Columns", "One").strip(" \t,")
-    epoch = _date(said.get("Date", ""), said.get("Time", ""))
-    at = end + 1
-    names: list[str] = []
+        return RawFile.of_table(read_table(path))
+    ends = [k for k, line in enumerate(lines) if line.strip(" \t,;") == _END]
+    if not ends:
+        raise InputError(f"has no {_END}", file=path)
+    first = lines[: ends[0]]
+    separator = next((s for s in "\t,;" if any(x.startswith(f"Separator{s}") for x in first)), "\t")
+    said = _said(first, separator)
+    decimal = (said.get("Decimal_Separator") or ["."])[0]
+    columns = (said.get("X_Columns") or ["One"])[0]
+    layout = TextLayout(delimiter=separator, decimal="," if decimal == "," else ".")
+    parts: dict[str, list[tuple[FloatArray, FloatArray]]] = {}
     units: dict[str, str] = {}
-    values: dict[str, list[float]] = {}
-    times: dict[str, list[float]] = {}
-    while at < len(lines):
-        head: dict[str, list[str]] = {}
-        while at < len(lines) and lines[at].strip() != _END:
-            if lines[at].strip():
-                key, *cells = lines[at].split(separator)
-                head[key] = cells
-            at += 1
-        if at >= len(lines):
-            break
-        if at + 1 >= len(lines):
-            raise InputError("ends within a header", file=path, key=f"line {at + 1}")
-        labels = [x.strip() for x in lines[at + 1].split(separator)]
-        own = [x for x in labels if x not in ("X_Value", "Comment", "")]
-        unique = Names()
-        own = [unique(x) for x in own]
-        if names and own != names:
+    left: list[Left] = []
+    told: tuple[str, ...] = ()
+    begin = ends[0]
+    for end in ends[1:]:
+        head = _said(lines[begin + 1 : end], separator)
+        labels = [x.strip() for x in lines[end + 1].split(separator)] if lines[end + 1 :] else []
+        labels = labels[: labels.index("Comment")] if "Comment" in labels else labels
+        names = [unique for unique, label in zip(map(Names(), labels), labels, strict=True)
+                 if label not in ("X_Value", "")]  # fmt: skip
+        if parts and list(parts) != names:
             raise InputError("this segment has other channels than the first", file=path,
-                             key=f"line {at + 2}", value=", ".join(own))  # fmt: skip
-        names = own
-        unit = [x.strip() for x in head.get("Y_Unit_Label", [])]
-        units = dict(zip(names, unit, strict=False))
-        try:
-            offset, step = ([_number(x, decimal) for x in head.get(key, []) if x.strip()]
-                            for key in ("X0", "Delta_X"))  # fmt: skip
-        except ValueError as error:
-            raise InputError("X0 or Delta_X is no number", file=path, key=f"line {at + 1}",
-                             value=str(error).partition(": ")[2][:60]) from None  # fmt: skip
-        if columns == "No" and min(len(offset), len(step)) < len(names):
-            raise InputError("has neither an X column nor X0 and Delta_X of each channel",
-                             file=path, key=f"line {at + 1}")  # fmt: skip
-        at, row = at + 2, 0
-        while at < len(lines) and lines[at].strip():
-            cells = lines[at].split(separator)[: _width(columns, len(names))]
-            try:
-                numbers = [_number(x, decimal) for x in cells]
-            except ValueError:
-                raise InputError("is no row of numbers", file=path, key=f"line {at + 1}",
-                                 value=lines[at][:60]) from None  # fmt: skip
-            if len(numbers) < _width(columns, len(names)):
-                raise InputError(f"must have {len(names)} channels", file=path,
-                                 key=f"line {at + 1}", value=lines[at][:60])  # fmt: skip
-            if columns == "Multi":
-                pairs = list(zip(numbers[::2], numbers[1::2], strict=True))
-            elif columns == "No":
-                pairs = [(offset[i] + row * step[i], v) for i, v in enumerate(numbers[1:])]
-            else:
-                pairs = [(numbers[0], v) for v in numbers[1:]]
-            for name, (time, value) in zip(names, pairs, strict=False):
-                times.setdefault(name, []).append(time)
-                values.setdefault(name, []).append(value)
-            at, row = at + 1, row + 1
-        at += 1
-    if not values:
+                             key=f"line {end + 2}", value=", ".join(names))  # fmt: skip
+        rows = list(itertools.takewhile(str.strip, lines[end + 2 :]))
+        begin = end + 2 + len(rows)
+        table = _table(path, layout, labels, rows, end + 2)
+        units |= dict(zip(names, head.get("Y_Unit_Label", []), strict=False))
+        left += [x for x in table.left if columns != "No" or x.column != "X_Value"]
+        for k, name in enumerate(names):
+            values = table.columns[name].values
+            own = "X_Value" if columns != "Multi" or not k else f"X_Value#{k + 1}"
+            x = table.columns[own].values
+            stamps = x[~np.isnan(x)]
+            if columns == "No" or not stamps.size or (np.diff(stamps) <= 0).any():
+                offset, step = (_of(head.get(key, []), k, decimal) for key in ("X0", "Delta_X"))
+                if columns == "No" and not step > 0.0:
+                    raise InputError("has neither an X column nor X0 and Delta_X of each channel",
+                                     file=path, key=f"line {end + 1}")  # fmt: skip
+                if step > 0.0:
+                    x = np.nan_to_num(offset) + step * np.arange(values.size)
+                if columns != "No":
+                    told = ("the stamps of X_Value do not ascend: times by Delta_X",)
+            there = ~(np.isnan(values) | np.isnan(x))
+            parts.setdefault(name, []).append((x[there], values[there]))
+    channels = {}
+    for name, pairs in parts.items():
+        x, values = (np.concatenate(column) for column in zip(*pairs, strict=True))
+        channels[name] = RawChannel(name, values, x, units.get(name) or None)
+    if not channels:
         raise InputError("holds no series of numbers", file=path)
-    channels = {
-        name: RawChannel(name, np.array(values[name]), np.array(times[name]),
-                         units.get(name) or None)
-        for name in names
-    }  # fmt: skip
-    return RawFile(path, "lvm", channels, None, epoch)
+    when = " ".join((said.get(key) or [""])[0].replace(",", ".") for key in ("Date", "Time"))
+    return RawFile(path, "lvm", channels, None, moment(when), told, left=gathered(left))
 
 
-def _width(columns: str, channels: int) -> int:
-    """Cells of numbers in a row: without an X column its cell is there and empty."""
-    return 2 * channels if columns == "Multi" else channels + 1
+def _said(lines: list[str], separator: str) -> dict[str, list[str]]:
+    """The cells of a header by its keys."""
+    cells = [[x.strip() for x in line.split(separator)] for line in lines]
+    return {key: values for key, *values in cells}
 
 
-def _number(cell: str, decimal: str) -> float:
-    """Of a cell; an empty one is missing."""
-    return float(cell.strip().replace(decimal, ".") or "nan")
+def _of(cells: list[str], place: int, decimal: str) -> float:
+    """A number that a header says of each channel, or of all; NaN of none."""
+    try:
+        return float(cells[min(place, len([x for x in cells if x]) - 1)].replace(decimal, "."))
+    except (ValueError, IndexError):
+        return np.nan
 
 
-def _date(date: str, time: str) -> int | None:
-    """Ns from 1970, of the two lines of the header; local time is taken for UTC."""
-    text = f"{date.strip()} {time.strip().replace(',', '.')}".replace("/", "-")
-    return moment(text)
+def _table(path: Path, layout: TextLayout, labels: list[str], rows: list[str], first: int) -> Table:
+    """A segment's rows; a channel that is shorter than others has empty cells at its end."""
+    width, separator = len(labels), layout.delimiter
+    cells = [(row.split(separator) + [""] * width)[:width] for row in rows]
+    text = "\n".join(separator.join(line) for line in [labels, *cells]) + "\n"
+    parts = list(stream_blocks(io.StringIO(text), path, layout, first=first)) if rows else []
+    if not parts:
+        raise InputError("ends within a header", file=path, key=f"line {first}")
+    return joined(parts)

@@ -19,6 +19,7 @@ _SCHEMA, _CHANNEL, _MESSAGE = 3, 4, 5
 _HEAD = struct.Struct("<BQ")  # kind and length of a record
 _ABOUT = struct.Struct("<HIQQ")  # of a message: channel, number, when logged, when published
 _WRITTEN = {("ros2msg", "cdr"), ("ros2idl", "cdr"), ("ros1msg", "ros1")}
+_CUT = "ends without a footer: what stands before its last, unfinished chunk is read"
 
 
 def read(path: Path, clock: Mapping[str, Any]) -> RawFile:
@@ -29,7 +30,7 @@ def read(path: Path, clock: Mapping[str, Any]) -> RawFile:
         clock: the mapping's `[time]`.
 
     Raises:
-        InputError: mcap is missing, the file is no MCAP or cut short, or holds no number.
+        InputError: mcap is missing, the file is no MCAP, or holds no number.
     """
     return next(collected(Series(path, "mcap", clock), _fill, _WORDS, whole=True))
 
@@ -52,6 +53,7 @@ def _fill(series: Series) -> Iterator[None]:
     """A chunk at a time."""
     try:
         import rosbags.typesys  # noqa: F401
+        from mcap.exceptions import EndOfFile
         from mcap.records import Channel, Chunk, Message, Schema
         from mcap.stream_reader import ReadDataStream, StreamReader, get_chunk_data_stream
     except ImportError:
@@ -65,6 +67,9 @@ def _fill(series: Series) -> Iterator[None]:
             schemas[record.id] = record
         elif isinstance(record, Channel) and record.id not in topics:
             schema, topics[record.id] = schemas.get(record.schema_id), None
+            if record.message_encoding == "json":
+                topics[record.id] = series.json_topic(record.topic)
+                return
             if schema is None or (schema.encoding, record.message_encoding) not in _WRITTEN:
                 warn_user(f"{series.path}: messages of {record.topic} are not ROS's and left out")
                 return
@@ -93,7 +98,17 @@ def _fill(series: Series) -> Iterator[None]:
             at += length
 
     with open(series.path, "rb") as file:
-        for record in StreamReader(file, emit_chunks=True, validate_crcs=True).records:
+        records = StreamReader(file, emit_chunks=True, validate_crcs=True).records
+        while True:
+            try:
+                record = next(records, None)
+            except (EndOfFile, struct.error):
+                if file.read(1):
+                    raise
+                warn_user(f"{series.path}: {_CUT}")
+                return
+            if record is None:
+                return
             if isinstance(record, Chunk):
                 stream, length = get_chunk_data_stream(record, validate_crc=True)
                 inside(stream.read(length))

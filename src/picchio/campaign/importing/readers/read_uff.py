@@ -9,14 +9,19 @@ from typing import Any
 import numpy as np
 
 from picchio.campaign.importing.isolated import Limits
-from picchio.campaign.importing.raw import Names, RawChannel, RawFile
+from picchio.campaign.importing.raw import RawChannel, RawFile
 from picchio.campaign.uff import data_sets, label_of, place
 from picchio.core.errors import InputError, warn_user
+from picchio.core.tables import Names
 
 LIMITS = Limits(memory_a_byte=32.0)
 # Function types of data set 58 that are histories in time: general, and time response.
 _TIME_HISTORIES = (0, 1)
 _TIME_ABSCISSA = (0, 17)
+_FRF = (
+    'a frequency response function needs no import: in campaign.toml, [[record]] with kind = "frf",'
+    " file, and response and reference, such as 12+X"
+)
 
 
 def read(path: Path, clock: Mapping[str, Any]) -> RawFile:
@@ -45,8 +50,11 @@ def read(path: Path, clock: Mapping[str, Any]) -> RawFile:
         text = f"{path}: {skipped} data sets are no time histories and were left out"
         warn_user(text)
     if not channels:
-        raise InputError("holds no time history in a data set 58", file=path)
-    return RawFile(path, "uff", channels)
+        raise InputError("holds no time history in a data set 58", file=path, hint=_FRF if skipped
+                         else None)  # fmt: skip
+    still = [name for name, c in channels.items() if c.time is None]
+    told = (f"no clock of its own, as the abscissa increment is 0: {', '.join(still)}",)
+    return RawFile(path, "uff", channels, detected=told if still else ())
 
 
 def _channel(data: dict[str, Any], unique: Names, path: Path) -> RawChannel:
@@ -60,11 +68,12 @@ def _channel(data: dict[str, Any], unique: Names, path: Path) -> RawChannel:
     if values.size != int(data.get("num_pts", values.size)):
         raise InputError(f"must hold {int(data['num_pts'])} samples as its header says", file=path,
                          key=name, value=values.size)  # fmt: skip
+    time = np.asarray(data["x"], dtype=np.float64)
     label = " ".join(str(data.get(key) or "").strip() for key in ("id1", "rsp_ent_name"))
     return RawChannel(
         name,
         values.astype(np.float64),
-        np.asarray(data["x"], dtype=np.float64),
+        time if time.size < 2 or np.ptp(time) > 0.0 else None,
         label_of(data, "ordinate"),
         note=label.strip(),
     )

@@ -7,6 +7,7 @@ together: a thousand times as fast as decoding one message after the other.
 
 from __future__ import annotations
 
+import json
 import struct
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -17,11 +18,13 @@ from typing import Any
 import numpy as np
 
 from picchio.campaign.importing.raw import RawChannel, RawFile, reason
+from picchio.campaign.importing.readers.read_json_lines import by_key
 from picchio.core.arrays import FloatArray, IndexArray
 from picchio.core.errors import InputError, warn_user
 
 Fields = Mapping[str, Any]
 """Of each kind of message, as rosbags has them: (constants, [(field, how it is written)])."""
+Numbers = tuple[str, tuple[str | None, str | None], IndexArray, FloatArray]
 AT_ONCE = 1 << 16
 """Messages of a topic that are taken apart at a time."""
 _NANO = 1_000_000_000
@@ -41,6 +44,7 @@ _NUMBERS = {"bool": "u1", "byte": "u1", "octet": "u1", "char": "u1", "uint8": "u
 _BASE, _NAME, _ARRAY = 1, 2, 3  # rosbags' node types; the fourth is a sequence
 # Messages that are alike no more than in ones and twos are not compared with each other.
 _UNLIKE = 32
+_STAMPS = ("header.stamp", "timestamp", "stamp")
 _BEGIN = 4  # bytes before a message in CDR, which say how its numbers are written
 
 
@@ -193,9 +197,7 @@ class Topic:
     logged: list[int] = field(default_factory=list)
     _known: dict[int, list[tuple[_Layout, FloatArray]]] = field(default_factory=dict)
 
-    def taken(
-        self, log: bool, wanted: set[str] | None
-    ) -> Iterator[tuple[_Layout, IndexArray, FloatArray]]:
+    def numbers(self, log: bool, wanted: set[str] | None) -> Iterator[Numbers]:
         """Take the messages apart by where their numbers stand.
 
         Args:
@@ -203,7 +205,7 @@ class Topic:
             wanted: series that are needed; None for all.
 
         Returns:
-            layouts; of the messages that have them the stamps, (m,) ns, and the bytes (m, size).
+            of each series its name, unit and suggested channel, stamps, (m,) ns, and (m,) values.
         """
         sizes = np.array([len(d) for d in self.data])
         logged = np.array(self.logged, dtype=np.int64)
@@ -220,7 +222,8 @@ class Topic:
                         _column(same, place + 4 * k, kind[0] + "u4" if k else kind) for k in (0, 1)
                     )
                     stamps = seconds.astype(np.int64) * _NANO + rest.astype(np.int64)
-                yield layout, stamps, same
+                for (name, place, kind), what in zip(layout.numbers, layout.about, strict=True):
+                    yield name, what, stamps, _column(same, place, kind).astype(np.float64)
         self.data, self.logged = [], []
 
     def _alike(
@@ -248,6 +251,35 @@ class Topic:
             if len(known) < _UNLIKE:
                 known.append((layout, fixed))
             left = left[~same]
+
+
+@dataclass(eq=False)
+class JsonTopic(Topic):
+    """Messages of one topic that are objects of JSON."""
+
+    def numbers(self, log: bool, wanted: set[str] | None) -> Iterator[Numbers]:
+        """As `Topic`."""
+        found = by_key([json.loads(data) for data in self.data])
+        stamps = np.array(self.logged, dtype=np.int64)
+        for head in () if log else _STAMPS:
+            names = [f"{head}.{rest}" for rest in ("sec", "nsec", "nanosec")]
+            parts = [found.get(name, ((), ()))[1] for name in names]
+            if len(parts[0]) == len(self.data) == len(parts[1] or parts[2]):
+                seconds, rest = (np.array(p, np.int64) for p in (parts[0], parts[1] or parts[2]))
+                stamps = seconds * _NANO + rest
+                break
+        for name, (at, values) in found.items():
+            own = f"{self.name}:{name}"
+            if name.startswith((*_STAMPS, "header.")) or not (wanted is None or own in wanted):
+                continue
+            if name.endswith(f"[{_LONGEST}]") or not all(
+                isinstance(v, (bool, int, float)) for v in values
+            ):
+                warn_user(f"{own}: left out: {len(values)} values, the first {values[0]!r:.60}")
+                continue
+            there = stamps if len(at) == stamps.size else stamps[at]
+            yield own, (None, None), there, np.array(values, np.float64)
+        self.data, self.logged = [], []
 
 
 def _column(table: FloatArray, place: int, kind: str) -> FloatArray:
@@ -298,6 +330,16 @@ class Series:
         self._topics.append(made)
         return made
 
+    def json_topic(self, name: str) -> Topic:
+        """A topic of JSON that is collected.
+
+        Args:
+            name: of the topic.
+        """
+        made = JsonTopic(name, "", {})
+        self._topics.append(made)
+        return made
+
     @property
     def full(self) -> bool:
         """Whether many messages of a topic wait to be taken apart."""
@@ -306,14 +348,12 @@ class Series:
     def settle(self) -> None:
         """Take apart the messages that wait."""
         for topic in self._topics:
-            for layout, stamps, table in topic.taken(self.log, self.wanted):
-                for (name, place, kind), what in zip(layout.numbers, layout.about, strict=True):
-                    values = _column(table, place, kind).astype(np.float64)
-                    there = ~np.isnan(values)
-                    if there.any():
-                        own = (stamps, values) if there.all() else (stamps[there], values[there])
-                        self._parts.setdefault(name, []).append(own)
-                        self._about.setdefault(name, what)
+            for name, what, stamps, values in topic.numbers(self.log, self.wanted):
+                there = ~np.isnan(values)
+                if there.any():
+                    own = (stamps, values) if there.all() else (stamps[there], values[there])
+                    self._parts.setdefault(name, []).append(own)
+                    self._about.setdefault(name, what)
 
     def block(self) -> RawFile | None:
         """What was collected since the last time; None where it holds no number."""
