@@ -12,7 +12,7 @@ import io
 import re
 import warnings
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import islice
@@ -286,7 +286,8 @@ def joined(parts: Sequence[Table]) -> Table:
 
 
 def table_blocks(
-    path: str | Path, layout: TextLayout | None = None, size: int = BLOCK
+    path: str | Path, layout: TextLayout | None = None, size: int = BLOCK, *,
+    numbers: Collection[str] = (),
 ) -> Iterator[Table]:  # fmt: skip
     """The same in blocks of rows, so that memory does not grow with the file.
 
@@ -296,6 +297,7 @@ def table_blocks(
         path: the file.
         layout: how it is written.
         size: rows of a block, about.
+        numbers: columns that are taken for numbers whatever they hold.
 
     Raises:
         InputError: as `read_table`.
@@ -310,7 +312,8 @@ def table_blocks(
         with open(source, encoding=encoding, errors="replace") as stream:
             for _ in range(layout.skip_lines):
                 stream.readline()
-            yield from stream_blocks(stream, source, layout, size, layout.skip_lines + 1, told=told)
+            yield from stream_blocks(stream, source, layout, size, layout.skip_lines + 1, told=told,
+                                     numbers=numbers)  # fmt: skip
     except (LookupError, UnicodeError):
         raise InputError("is no encoding of text that is known", file=path, key="encoding",
                          value=encoding) from None  # fmt: skip
@@ -318,7 +321,7 @@ def table_blocks(
 
 def stream_blocks(
     stream: IO[str], path: Path, layout: TextLayout, size: int = BLOCK, first: int = 1, *,
-    told: tuple[str, ...] = (),
+    told: tuple[str, ...] = (), numbers: Collection[str] = (),
 ) -> Iterator[Table]:  # fmt: skip
     """Blocks of a table that stands in a stream, from its header on.
 
@@ -329,8 +332,9 @@ def stream_blocks(
         size: rows of a block, about.
         first: number of the stream's first line in the file.
         told: what there is to say of it.
+        numbers: columns that are taken for numbers whatever they hold.
     """
-    yield from _Reader(path, layout, told).blocks(stream, size, first)
+    yield from _Reader(path, layout, told, numbers).blocks(stream, size, first)
 
 
 def encoding_of(path: Path) -> str:
@@ -540,12 +544,14 @@ def are_units(cells: Sequence[str]) -> bool:
 class _Reader:
     """Parses a table block by block, and keeps what its first block shows."""
 
-    def __init__(self, path: Path, layout: TextLayout, told: tuple[str, ...]) -> None:
+    def __init__(
+        self, path: Path, layout: TextLayout, told: tuple[str, ...], numbers: Collection[str]
+    ) -> None:
         self.path, self.layout, self.told = path, layout, told
         self.names: list[str] = []
         self.header: list[str] = []
         self.units: list[str | None] = []
-        self.kinds: dict[str, str] = {}
+        self.kinds, self.started = dict.fromkeys(numbers, "number"), False
         self.sep = layout.delimiter
 
     def blocks(self, stream: IO[str], size: int, first: int) -> Iterator[Table]:
@@ -604,11 +610,12 @@ class _Reader:
             at = several[0]
             left.append(Left(why, len(several) * width, first + at, lines[at].strip(),
                              len(several)))  # fmt: skip
-        if not rows and not self.kinds:
+        if not rows and not self.started:
             if not left:
                 return None
             raise InputError(f"has not {width} cells, as the header has", file=self.path,
                              key=f"line {left[0].line}", value=left[0].text[:60])  # fmt: skip
+        self.started = True
         columns: dict[str, Column] = {}
         frame = self._parsed(rows, width)
         for index, name in enumerate(self.names):

@@ -23,7 +23,7 @@ _TIME_NAME = re.compile(
 )
 _DAY = 86_400 * NS
 UNITS: dict[str, tuple[int, int | None]] = {
-    "s": (NS, None), "ms": (10**6, None), "us": (10**3, None), "ns": (1, None),
+    "s": (NS, 0), "ms": (10**6, 0), "us": (10**3, 0), "ns": (1, 0),
     "min": (60 * NS, None), "h": (3600 * NS, None), "days": (_DAY, None), "100 ns": (100, None),
     "days since 1899": (_DAY, -25_569 * _DAY),  # spreadsheets
     "days since year 0": (_DAY, -719_529 * _DAY),  # MATLAB's datenum
@@ -183,10 +183,10 @@ def dated(values: FloatArray, unit: str) -> bool:
         values: (m,) as stored.
         unit: of them.
     """
-    found = known(values[:1]).tolist()
+    found = known(values)[:1].tolist()
     # Whole numbers without end: stamps in ms that are said to be s are beyond what 64 bits hold.
     factor, zero = UNITS[unit]
-    return bool(found) and _DATES[0] <= found[0] * factor + (zero or 0) <= _DATES[1]
+    return zero is not None and bool(found) and _DATES[0] <= found[0] * factor + zero <= _DATES[1]
 
 
 def ns_of(values: FloatArray, unit: str) -> FloatArray:

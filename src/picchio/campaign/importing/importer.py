@@ -25,12 +25,14 @@ from picchio.campaign.importing.raw import RawChannel, RawFile, below
 from picchio.campaign.importing.readers import read_parquet
 from picchio.campaign.importing.resample import clocked, common_clock, told_apart
 from picchio.campaign.record import Record
+from picchio.campaign.tables import CAMPAIGN_FILE
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError, warn_user
 from picchio.core.files import locked, regular_file
 from picchio.core.provenance import provenance
 from picchio.core.results import Result
 from picchio.core.tables import TextLayout, read_table, table_blocks
+from picchio.core.toml import read_toml
 
 _ROOM = "picchio.campaign.importing.readers"
 _ISOLATED = {
@@ -262,6 +264,7 @@ def detection(path: str | Path, mapping: Mapping | None = None) -> Detection:
         lines = [*raw.told, f"no clock: {error.problem}{hint}"]
     if not any(line.startswith("rate ") for line in lines):
         lines += clocks.values()
+    lines += [own] if (own := _own_record(raw.path)) else []
     return Detection(raw, tuple(lines))
 
 
@@ -372,6 +375,11 @@ def _read_mapped(
     """The campaign, and what was detected."""
     if not mapping.entries:
         raise InputError("needs a [[channel]] or a [[coupling]]", file=mapping_file)
+    if (kind := mapping.record.get("kind")) in ("static", "frf"):
+        raise InputError(f"a table of the kind {kind} needs no import, as it has no clock",
+                         file=mapping_file, key="record.kind", hint=f"list it in campaign.toml: "
+                         f"[[record]] file = {Path(path).name!r}, kind = {kind!r}; its columns are "
+                         "named `channel [unit]`")  # fmt: skip
     raw = joined(read_raw(path, mapping), mapping, mapping_file)
     used: dict[str, RawChannel] = {}
     for key, _, parts, _ in mapping.entries:
@@ -546,7 +554,8 @@ def import_record(
             "needs a mapping from its series to the campaign's channels",
             file=source,
             key="--mapping",
-            hint=f"`picchio import {source} --write-mapping mapping.toml` writes one to edit",
+            hint=_own_record(source)
+            or f"`picchio import {source} --write-mapping mapping.toml` writes one to edit",
         )
     rules = Path(mapping)
     new, found = _read_mapped(source, read_mapping(rules), name, rules)
@@ -563,13 +572,32 @@ def import_record(
     return ImportedRecord(made, origin, found, added)
 
 
+def _own_record(path: Path) -> str:
+    """What to do with a file that is a record of the campaign in its folder; "" of others."""
+    try:
+        table = read_toml(path.parent / CAMPAIGN_FILE)
+    except InputError:
+        return ""
+    files = [entry.get("file") for entry in table.get("record", ()) if isinstance(entry, dict)]
+    if path.name not in files:
+        return ""
+    return (f"it is a record of the campaign {path.parent} already and needs no import: "
+            f"`picchio check ROBOT --data {path.parent}`")  # fmt: skip
+
+
 def _appended(new: Campaign, to: Path, mapping: bytes) -> tuple[Campaign, dict[str, bytes]]:
     """The campaign at `to` with the new record in it, and the mapping's file."""
     old = load_campaign(to)
     settings = new.table.model_dump(exclude_none=True, exclude_defaults=True, exclude={"record"})
     standing = old.table.model_dump(exclude_none=True, exclude_defaults=True, exclude={"record"})
     for key, value in settings.items():
-        if standing.get(key) != value:
+        same = standing.get(key) == value
+        if key == "robot" and not same:  # saving wrote the way to the same file anew
+            files = [Path(robot) for robot in (new.robot, old.robot) if robot is not None]
+            same = (
+                len(files) == 2 and all(f.is_file() for f in files) and files[0].samefile(files[1])
+            )
+        if not same:
             raise InputError("the mapping says otherwise than the campaign that stands there",
                              file=to, key=key, value=value,
                              hint="what is this record's own belongs under [record]")  # fmt: skip

@@ -195,7 +195,9 @@ def below(parts: list[RawFile]) -> RawFile:
     return replace(first, channels=channels, texts=texts, left=left)
 
 
-def columns_of(name: str, value: Any, depth: int = _DEEPEST) -> Iterator[Column | Left]:
+def columns_of(
+    name: str, value: Any, depth: int = _DEEPEST, *, table: bool = False
+) -> Iterator[Column | Left]:
     """What a value of a MATLAB, NumPy, Parquet or JSON file holds, as columns.
 
     A field of a struct is `name.field`; of a matrix, or of a column of lists, `name(1)`, `name(2)`,
@@ -205,6 +207,7 @@ def columns_of(name: str, value: Any, depth: int = _DEEPEST) -> Iterator[Column 
         name: of the value; empty for a whole file.
         value: array, list, table, or dictionary of them.
         depth: how many structs may stand in one another.
+        table: whether it is a table, of which one row is a series, too.
 
     Returns:
         the columns, and what is none of them.
@@ -212,11 +215,13 @@ def columns_of(name: str, value: Any, depth: int = _DEEPEST) -> Iterator[Column 
     if hasattr(value, "to_dict") and hasattr(value, "columns"):  # a table of pandas
         index = value.index
         named = {} if index.dtype.kind not in "mM" else {index.name or "index": index.to_numpy()}
-        value = named | {str(key): value[key].to_numpy() for key in value.columns}
+        value, table = named | {str(key): value[key].to_numpy() for key in value.columns}, True
     if isinstance(value, dict) or hasattr(value, "_fieldnames"):
         parts = value if isinstance(value, dict) else vars(value)
         for key, part in parts.items() if depth else ():
-            yield from columns_of(f"{name}.{key}" if name else str(key), part, depth - 1)
+            yield from columns_of(
+                f"{name}.{key}" if name else str(key), part, depth - 1, table=table
+            )
         return
     try:
         array = np.asarray(value)
@@ -224,15 +229,15 @@ def columns_of(name: str, value: Any, depth: int = _DEEPEST) -> Iterator[Column 
         array = np.empty(0)
     if array.dtype.names and array.size == 1:
         record = array.ravel()[0]
-        yield from columns_of(name, {n: record[n] for n in array.dtype.names}, depth)
+        yield from columns_of(name, {n: record[n] for n in array.dtype.names}, depth, table=table)
         return
     if array.dtype.names:
-        yield from columns_of(name, {n: array[n] for n in array.dtype.names}, depth)
+        yield from columns_of(name, {n: array[n] for n in array.dtype.names}, depth, table=table)
         return
     if array.dtype.kind == "O":
         array = _plain(array)
         if isinstance(array, dict):
-            yield from columns_of(name, array, depth)
+            yield from columns_of(name, array, depth, table=table)
             return
     kind = array.dtype.kind
     if kind in "US" or array.dtype == object:
@@ -249,7 +254,7 @@ def columns_of(name: str, value: Any, depth: int = _DEEPEST) -> Iterator[Column 
     dated = {"M": "date", "m": "clock"}.get(kind, "number")
     if kind in "mM":
         array = array.astype(f"{kind}8[ns]").astype(np.int64)
-    if array.size == 1 and dated == "number":
+    if array.size == 1 and dated == "number" and not table:
         yield Column(name, "scalar", array.ravel()[0])
         return
     if array.size == 0:

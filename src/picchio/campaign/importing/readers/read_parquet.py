@@ -57,6 +57,6 @@ def blocks(path: Path, size: int) -> Iterator[RawFile]:
                         if pyarrow.types.is_timestamp(about.type):  # without its zone: UTC
                             cells = cells.cast(pyarrow.timestamp("ns"))
                         columns[about.name] = cells.to_pandas().to_numpy()
-                    yield RawFile.of(path, "parquet", columns_of("", columns))
+                    yield RawFile.of(path, "parquet", columns_of("", columns, table=True))
     except (pyarrow.ArrowException, OSError, ValueError) as error:
         raise InputError(f"is not a readable Parquet file: {reason(error)}", file=path) from None
