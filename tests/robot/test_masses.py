@@ -138,7 +138,7 @@ def serial(*bodies: tuple[float, float, str], length: float = 0.4) -> str:
         parts.append(
             f'<joint name="j{k}" type="revolute"><parent link="{parent}"/><child link="l{k}"/>'
             f'<origin xyz="0 0 {length}"/><axis xyz="{k % 2} {(k + 1) % 2} 0"/>'
-            '<limit lower="-2" upper="2" effort="100" velocity="1"/></joint>'
+            f'<limit lower="-2" upper="2" effort="{200 - 10 * k}" velocity="1"/></joint>'
             f'<link name="l{k}">{inertial if mass else ""}'
             f'<collision><origin xyz="0 0 {length / 2}"/><geometry><box size="0.1 0.1 {length}"/>'
             f"</geometry></collision>{more}</link>"
