@@ -168,7 +168,12 @@ def placeholders(robot: FlexibleRobot) -> dict[str, str]:
                  and 0.0 < joint.effort < np.inf]  # fmt: skip
         unit = "N" if slides else "N m"
         weak = [joint for joint in given if joint.effort < own[joint.name]]
-        if len({joint.effort for joint in given}) == 1 and len(given) > 1:
+        # Of a lone joint, the rest of the file tells.
+        every = [joint for joint in robot.tree.joints.values()
+                 if (joint.type == "prismatic") == slides]  # fmt: skip
+        rest = [joint.effort for joint in every if 0.0 < joint.effort < np.inf]
+        alike = [joint.effort for joint in given] if len(given) > 1 else rest
+        if given and len(alike) > 1 and len(set(alike)) == 1:
             why = f"{given[0].effort:g} {unit} stands at every joint: a placeholder"
         elif weak:
             worst = max(weak, key=lambda joint: own[joint.name] / joint.effort)
