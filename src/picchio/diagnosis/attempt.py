@@ -42,7 +42,8 @@ def trials(functions: Mapping[str, Callable[[Any], Any]]) -> dict[str, Callable[
     Args:
         functions: by name, for the log.
     """
-    return {
-        name: lambda item, name=name, function=function: attempt(name, partial(function, item))
-        for name, function in functions.items()
-    }
+
+    def safe(name: str, function: Callable[[Any], Any]) -> Callable[[Any], Any]:
+        return lambda item: attempt(name, partial(function, item))
+
+    return {name: safe(name, function) for name, function in functions.items()}

@@ -6,6 +6,7 @@ there is, by the table `_AMPLITUDES`. A further habit is a line there. What is n
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -154,7 +155,7 @@ def _named(column: Column) -> _Named:
     name, unit, base = _spaced(column.name.strip()), column.unit, None
     name = re.sub(r"(?i)\b(log|lg|ln)(?=n\b)", r"\1 ", name)
     if found := _LOGARITHM.search(name):
-        base = np.e if found[1].lower() == "ln" else 10.0
+        base = math.e if found[1].lower() == "ln" else 10.0
         name = name.replace(found[0], found[2] or "", 1)
     factor, name = _factor(name)
     inside = re.findall(r"[\[(<]([^\[<>\]]*?)[\])>](?=\s*(?:$|[\[(<]))", name)
@@ -406,7 +407,7 @@ def _cycles(reading: _Reading, column: str | None) -> tuple[FloatArray, str]:
     elif unit is not None:
         factor *= next((_TIMES[w] for w in _words(unit).split() if w in _TIMES), 1.0)
         if re.match(r"(log ?10|log|lg|ln)\b", unit, re.I):
-            one = replace(one, base=np.e if unit.lower().startswith("ln") else 10.0)
+            one = replace(one, base=math.e if unit.lower().startswith("ln") else 10.0)
     life = factor * one.values(reading.file, reading.table.lines)
     longest = float(np.nanmax(life, initial=0.0))
     if 0.0 < longest < _LEAST_LIFE:
@@ -415,7 +416,9 @@ def _cycles(reading: _Reading, column: str | None) -> tuple[FloatArray, str]:
                          "cycles', thousands by 'Cycles [x1000]'")  # fmt: skip
     how = [f"times {factor:g}"] if factor != 1.0 else []
     how += (
-        ["natural logarithms" if one.base == np.e else "logarithms to base 10"] if one.base else []
+        ["natural logarithms" if one.base == math.e else "logarithms to base 10"]
+        if one.base
+        else []
     )
     reading.notes.append(", ".join([f"cycles: {one.column.name}", *how]))
     return life, one.column.name
