@@ -108,7 +108,8 @@ def given(tmp_path_factory):
     shutil.copy(folder / "raw.csv", folder / "logs" / "raw.csv")
     text = (folder / "made.toml").read_text()
     start = 'unit = "ms"\nstart = 2026-03-01T08:00:00Z'
-    text = text.replace('unit = "ms"', start, 1) + '[blows]\noperation = "forward"\n'
+    stands = '[blows]\noperation = "forward"\npose = [0.0, 0.5, -0.8]\n'
+    text = text.replace('unit = "ms"', start, 1) + stands
     (folder / "logs" / "mapping.toml").write_text(text)
     shutil.copytree(folder / "logs", folder / "fleet" / "one")
     (folder / "link.stl").write_text(

@@ -103,7 +103,7 @@ def started() -> Any:
 # Command line, and what the function returns; both write what they write where the other did.
 COMMANDS: dict[str, tuple[str, Any]] = {
     "annotate": ("annotate fanuc_like_3dof --out a.urdf", annotated),
-    "assess": ("assess fanuc_like_3dof", lambda: picchio.assess(*arm())),
+    "assess": ("assess fanuc_like_3dof", lambda: picchio.assess(arm()[0])),
     "check": ("check measured", lambda: picchio.check("measured")),
     "compare": (
         "compare old.json new.json",
