@@ -10,8 +10,9 @@ it goes, keyed by the case and the seeds' salt: run it again and it goes on wher
     python benchmarks/blind_trial.py --out new.jsonl --fresh      # seeds never used before
     python benchmarks/blind_trial.py --out part.jsonl --only single --most 20
     python benchmarks/blind_trial.py --out trial.jsonl --summary --since b3ad859  # later code only
-    python benchmarks/blind_trial.py --out trial.jsonl --summary --page docs/blind_trial.md
-    python benchmarks/blind_trial.py --out trial.jsonl --against docs/blind_trial_plain_bic.jsonl
+    python benchmarks/blind_trial.py --out trial.jsonl --summary --page trial.md
+    python benchmarks/blind_trial.py --out trial.jsonl --against plain_bic.jsonl
+    python benchmarks/blind_trial.py --out trial.jsonl --thin rows.jsonl  # what the tables need
 
 Worlds that are a little wrong everywhere, by so many times the tolerances that the campaigns state:
 
@@ -160,6 +161,8 @@ def main():
         "--method", default="diagnose", help="or: score-test, plain-bic, another checkout's folder"
     )
     parser.add_argument("--summary", action="store_true", help="run nothing")
+    parser.add_argument("--cases", action="store_true", help="with --summary: all not right, too")
+    parser.add_argument("--thin", type=Path, help="write what the tables need of the rows")
     parser.add_argument("--since", metavar="COMMIT", help="tables of rows since this change only")
     parser.add_argument("--against", type=Path, help="a simpler method's rows: compare")
     parser.add_argument(
@@ -196,7 +199,7 @@ def main():
     commit = subprocess.run(
         ["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True
     ).stdout.strip()
-    if not given.summary and not given.against:
+    if not (given.summary or given.against or given.thin):
         import trial
 
         import picchio
@@ -228,6 +231,12 @@ def main():
                 print(f"{number}/{len(todo)}", *note, file=sys.stderr)
     import trial_tables
 
+    if given.thin:
+        lines = (
+            json.dumps(row, separators=(",", ":")) + "\n" for row in trial_tables.thinned(rows)
+        )
+        given.thin.write_text("".join(lines))
+        return
     if given.curve:
         ways = {"picchio": rows}
         for name, _, path in (each.partition("=") for each in given.curve):
@@ -238,14 +247,15 @@ def main():
         return
     if given.mismatch is not None:
         rows = trial_tables.of_draws(rows, given.seeds, given.mismatch)
-        trial_tables.mismatch_summary(since(rows, given.since) if given.since else rows)
+        told = since(rows, given.since) if given.since else rows
+        trial_tables.mismatch_summary(told, given.cases)
         return
     if given.against:
         trial_tables.print_against(rows, trial_tables.read_rows(given.against))
         return
     if given.page:
         trial_tables.into_page(rows, given.page)
-    trial_tables.summary(since(rows, given.since) if given.since else rows)
+    trial_tables.summary(since(rows, given.since) if given.since else rows, given.cases)
 
 
 if __name__ == "__main__":

@@ -1,12 +1,13 @@
 """Build the site: `python docs/build.py` writes docs/_build/html; every warning is an error.
 
-Pages are assembled from what is there already: README, CHANGELOG, CONTRIBUTING, the guides beside
-this file, the notebooks as they stand, the catalogue of effects, the tables of the file formats,
-and the docstrings. Nothing is loaded from a network, neither now nor when the pages are read.
+The pages beside this file are taken as they stand. The reference is made here: commands, effects,
+file formats and Python, from the code and its docstrings. So is the gallery: each example is run
+for its picture. Nothing is loaded from a network, neither now nor when the pages are read.
 """
 
 from __future__ import annotations
 
+import ast
 import os
 import pkgutil
 import re
@@ -15,25 +16,70 @@ import subprocess
 import sys
 from pathlib import Path
 
+from examples import EXAMPLES, draw
+
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
 SOURCE = HERE / "_build" / "source"
 HTML = HERE / "_build" / "html"
 
-GUIDES = {
-    "first_minutes": "The first ten minutes",
-    "diagnosis": "Diagnosis",
-    "counting": "Counting from logs",
-    "motion": "Motion records",
-    "explore": "Explore",
-    "path_cost": "A cost for planners",
-    "placement": "Placement",
-    "priors": "Drive priors",
-    "stiffness": "Stiffness from nothing",
-    "test_plans": "Planned tests",
-    "paper": "The paper, reproduced",
-    "performance": "Performance",
-    "blind_trial": "The blind trial",
+# Pages of the repository that lie elsewhere, and folders that have a page of their own.
+ELSEWHERE = {
+    ROOT / "README.md": "readme.md",
+    ROOT / "CONTRIBUTING.md": "contributing.md",
+    ROOT / "CHANGELOG.md": "changelog.md",
+    ROOT / "notebooks": "notebooks/index.md",
+    EXAMPLES: "gallery.md",
+}
+PARTS = {
+    "Start": ("readme", "gallery"),
+    "Tutorials": ("tutorial/assess", "tutorial/own_robot", "tutorial/diagnose"),
+    "How to": tuple(
+        f"how_to/{name}"
+        for name in (
+            "import_logs",
+            "plan_tests",
+            "identify",
+            "diagnose",
+            "count",
+            "place",
+            "report",
+            "explore",
+            "planner_cost",
+        )
+    ),
+    "Reference": ("reference/commands", "reference/formats", "reference/effects", "api/index"),
+    "Explanation": tuple(
+        f"explanation/{name}"
+        for name in (
+            "theory",
+            "priors",
+            "stiffness",
+            "diagnosis",
+            "motion_records",
+            "counting",
+            "paper",
+            "limits",
+        )
+    ),
+    "Validation": tuple(
+        f"validation/{name}"
+        for name in (
+            "index",
+            "vibration",
+            "blind_trial",
+            "priors",
+            "stiffness",
+            "test_plans",
+            "motion_records",
+            "counting",
+            "placement",
+            "performance",
+            "first_minutes",
+        )
+    ),
+    "Notebooks": ("notebooks/index",),
+    "Project": ("contributing", "changelog"),
 }
 STAGES = (
     "robot",
@@ -61,42 +107,31 @@ _LINK = re.compile(r"\[([^\]]*)\]\(([^)#\s:]+)(#[^)\s]*)?\)")
 def main() -> int:
     """Assemble the pages and run Sphinx."""
     shutil.rmtree(HERE / "_build", ignore_errors=True)
-    for folder in ("notebooks", "api"):
+    for folder in ("notebooks", "api", "reference"):
         (SOURCE / folder).mkdir(parents=True)
     shutil.copytree(HERE / "images", SOURCE / "images")
-    pages = {ROOT / "README.md": "index", ROOT / "CHANGELOG.md": "changelog"}
-    if (ROOT / "CONTRIBUTING.md").exists():
-        pages[ROOT / "CONTRIBUTING.md"] = "contributing"
-    pages |= {HERE / f"{name}.md": name for name in GUIDES}
+    pages = {path: path.relative_to(HERE) for path in HERE.rglob("*.md")}
+    pages = {path: SOURCE / page for path, page in pages.items() if "_build" not in page.parts}
+    pages |= {path: SOURCE / name for path, name in ELSEWHERE.items()}
+    for path, page in pages.items():
+        if path.is_file():
+            page.parent.mkdir(parents=True, exist_ok=True)
+            page.write_text(relink(path, pages), encoding="utf-8")
+    with (SOURCE / "index.md").open("a", encoding="utf-8") as stream:
+        stream.writelines(toctree(caption, entries) for caption, entries in PARTS.items())
     notebooks = sorted((ROOT / "notebooks").glob("*.ipynb"))
-    for path, name in pages.items():
-        text = relink(path.read_text(encoding="utf-8"), path.parent, pages)
-        (SOURCE / f"{name}.md").write_text(
-            text + (contents(pages, notebooks) * (name == "index")), encoding="utf-8"
-        )
     for path in notebooks:
         shutil.copy(path, SOURCE / "notebooks")
     write("notebooks/index.md", notebook_page(notebooks))
-    write("effects.md", effects_page())
-    write("formats.md", formats_page())
+    write("gallery.md", gallery_page())
+    write("reference/commands.md", commands_page())
+    write("reference/effects.md", effects_page())
+    write("reference/formats.md", formats_page())
     api_pages()
     # Compiled functions are documented as the functions they are.
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
-    command = [
-        sys.executable,
-        "-m",
-        "sphinx",
-        "-W",
-        "--keep-going",
-        "-q",
-        "-j",
-        "auto",
-        "-c",
-        str(HERE),
-        str(SOURCE),
-        str(HTML),
-    ]
-    done = subprocess.run(command, env=environment)
+    options = ("-W", "--keep-going", "-q", "-j", "auto", "-c", HERE, SOURCE, HTML)
+    done = subprocess.run([sys.executable, "-m", "sphinx", *map(str, options)], env=environment)
     if done.returncode == 0:
         offline(HTML)
         print(f"built {HTML.relative_to(ROOT)}")
@@ -108,47 +143,76 @@ def write(name: str, text: str) -> None:
     (SOURCE / name).write_text(text, encoding="utf-8")
 
 
-def relink(text: str, folder: Path, pages: dict[Path, str]) -> str:
-    """Links between files of the repository as links between pages, or as downloads."""
+def relink(path: Path, pages: dict[Path, Path]) -> str:
+    """A page with its links between files of the repository as links in the site, or downloads."""
 
     def change(match: re.Match[str]) -> str:
-        label, target = match[1], (folder / match[2]).resolve()
-        if target in pages:
-            path = f"{pages[target]}.md"
-        elif target == ROOT / "notebooks":
-            path = "notebooks/index.md"
-        elif target.is_relative_to(HERE / "images"):
-            path = f"images/{target.name}"
-        elif not target.exists():
-            raise SystemExit(f"docs: a link to {match[2]}, which is not there")
+        label, target = match[1], (path.parent / match[2]).resolve()
+        if not target.exists():
+            raise SystemExit(f"docs: {path}: a link to {match[2]}, which is not there")
+        if target.is_relative_to(HERE / "images"):
+            to = SOURCE / "images" / target.name
+        elif target in pages:
+            to = pages[target]
         elif target.suffix == ".md":
             return label  # a page of the repository alone
         else:
-            path = os.path.relpath(target, SOURCE)
-        return f"[{label}]({path}{match[3] or ''})"
+            to = target
+        return f"[{label}]({os.path.relpath(to, pages[path].parent)}{match[3] or ''})"
 
-    return _LINK.sub(change, text)
-
-
-def contents(pages: dict[Path, str], notebooks: list[Path]) -> str:
-    """The tables of contents, at the end of the first page."""
-    guides = [f"{title} <{name}>" for name, title in GUIDES.items()]
-    more = [name for name in ("contributing", "changelog") if name in pages.values()]
-    return "".join(
-        toctree(caption, entries)
-        for caption, entries in (
-            ("Guides", guides),
-            ("Reference", ["Effects <effects>", "File formats <formats>", "Python <api/index>"]),
-            ("Notebooks", ["Notebooks <notebooks/index>"]),
-            ("Project", more),
-        )
-    )
+    return _LINK.sub(change, path.read_text(encoding="utf-8"))
 
 
-def toctree(caption: str, entries: list[str], depth: int = 1) -> str:
+def toctree(caption: str, entries: tuple[str, ...]) -> str:
     """A table of contents that only the sidebar shows."""
-    head = f"\n```{{toctree}}\n:hidden:\n:maxdepth: {depth}\n"
+    head = "\n```{toctree}\n:hidden:\n:maxdepth: 1\n"
     return head + (f":caption: {caption}\n" if caption else "") + "\n".join(entries) + "\n```\n"
+
+
+def gallery_page() -> str:
+    """Every example with its picture, which is made by running it."""
+    (SOURCE / "images" / "gallery").mkdir()
+    cells, sections = [], []
+    for path in sorted(EXAMPLES.glob("*.py")):
+        code = path.read_text(encoding="utf-8")
+        title, _, detail = ast.get_docstring(ast.parse(code)).partition("\n")
+        picture = f"images/gallery/{path.stem}.png"
+        draw(path, SOURCE / picture)
+        cells.append(f"[![{title}]({picture})](#{path.stem})")
+        code = code.partition('"""\n')[2].strip()
+        sections += [f"({path.stem})=", f"## {title}\n", f"{detail.strip()}\n"]
+        sections += [f"![{title}]({picture})\n", f"```python\n{code}\n```\n"]
+    rows = [f"| {' | '.join(cells[k : k + 4])} |" for k in range(0, len(cells), 4)]
+    lines = ["# Gallery\n", "Each example is complete: copy it and run it.\n"]
+    return "\n".join([*lines, "| | | | |", "|---|---|---|---|", *rows, "", *sections])
+
+
+def commands_page() -> str:
+    """Every command with its options, as `picchio COMMAND --help` has them."""
+    import click
+    from typer.main import get_command
+
+    from picchio.cli.main import app
+
+    root = get_command(app)
+    lines = ["# Commands\n", "`picchio COMMAND --help` prints the same.\n"]
+    for name, command in root.commands.items():
+        context = click.Context(command, info_name=f"picchio {name}")
+        lines += [f"## picchio {name}\n", f"{_plain(command.help or '')}\n"]
+        lines += [
+            "```sh",
+            context.command_path + " " + " ".join(command.collect_usage_pieces(context)),
+        ]
+        lines += [command.epilog.removeprefix("Example: ")] if command.epilog else []
+        lines += ["```", ""]
+        rows = []
+        for option in command.params:
+            if isinstance(option, click.Argument):
+                rows.append((f"`{option.make_metavar(context)}`", option.help or ""))
+            elif record := option.get_help_record(context):
+                rows.append((f"`{record[0]}`", record[1]))
+        lines += table(("option", "meaning"), rows)
+    return "\n".join(lines)
 
 
 def notebook_page(notebooks: list[Path]) -> str:
@@ -160,7 +224,7 @@ def notebook_page(notebooks: list[Path]) -> str:
         first = json.loads(path.read_text(encoding="utf-8"))["cells"][0]["source"]
         title = "".join(first).splitlines()[0].lstrip("# ")
         lines.append(f"- [{title}]({path.name})")
-    return "\n".join(lines) + "\n" + toctree("", [path.stem for path in notebooks])
+    return "\n".join(lines) + "\n" + toctree("", tuple(path.stem for path in notebooks))
 
 
 def effects_page() -> str:
@@ -277,7 +341,7 @@ def api_pages() -> None:
         lines += ["```", ""]
     lines += ["## By stage\n", "Every module, in the order in which data flow.\n"]
     lines += [f"- [{stage}]({stage}.md)" for stage in STAGES]
-    write("api/index.md", "\n".join(lines) + "\n" + toctree("", list(STAGES)))
+    write("api/index.md", "\n".join(lines) + "\n" + toctree("", STAGES))
     for stage in STAGES:
         write(f"api/{stage}.md", stage_page(stage))
 

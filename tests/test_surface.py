@@ -72,9 +72,14 @@ def modules() -> list[str]:
     return found
 
 
-def test_dir_shows_the_functions_the_loaders_and_what_the_readme_uses(repository: Path) -> None:
-    readme = set(re.findall(r"\bpicchio\.([A-Za-z]\w*)", (repository / "README.md").read_text()))
-    assert set(dir(picchio)) == FUNCTIONS | LOADERS | (readme & set(picchio.__all__)) | {"datasets"}
+def test_dir_shows_the_functions_the_loaders_and_what_the_guides_use(repository: Path) -> None:
+    guides = [repository / "README.md", *(repository / "docs").glob("*/*.md")]
+    guides += (repository / "docs" / "gallery").glob("*.py")
+    shown = {
+        name for path in guides
+        for name in re.findall(r"\bpicchio\.([A-Za-z]\w*)", path.read_text())
+    }  # fmt: skip
+    assert set(dir(picchio)) == FUNCTIONS | LOADERS | (shown & set(picchio.__all__)) | {"datasets"}
     assert picchio.__all__ == dir(picchio)
     assert re.fullmatch(r"\d+\.\d+.*", picchio.__version__)
     with pytest.raises(AttributeError, match="no attribute 'asses'"):

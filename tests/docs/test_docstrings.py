@@ -17,7 +17,7 @@ def missing():
 def _imported_by_guides():
     """(module, name) of all that README, guides and notebooks import."""
     pages = [docstrings.ROOT / "README.md", docstrings.ROOT / "CONTRIBUTING.md"]
-    pages += [*(docstrings.ROOT / "docs").glob("*.md")]
+    pages += [*(docstrings.ROOT / "docs").rglob("*.md")]
     texts = [page.read_text(encoding="utf-8") for page in pages]
     for path in (docstrings.ROOT / "notebooks").glob("*.ipynb"):
         cells = json.loads(path.read_text(encoding="utf-8"))["cells"]

@@ -155,7 +155,7 @@ def test_a_recorded_force_keeps_its_time(first):
 
 
 def test_how_well_eight_samples_tell_the_impulse_of_a_half_sine():
-    """docs/diagnosis.md: 1.3 % too little to 0.6 % too much, by where they fall."""
+    """docs/how_to/diagnose.md: 1.3 % too little to 0.6 % too much, by where they fall."""
     width, step = 0.004, 0.0005
     errors = []
     for late in np.linspace(0.0, step, 50, endpoint=False):

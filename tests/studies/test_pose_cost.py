@@ -58,7 +58,7 @@ def test_a_robot_without_limits_is_refused() -> None:
 
 @pytest.mark.slow
 def test_the_example_lowers_a_paths_damage_at_equal_success(repository: Path) -> None:
-    text = (repository / "docs" / "path_cost.md").read_text()
+    text = (repository / "docs" / "how_to" / "planner_cost.md").read_text()
     found: dict[str, Any] = {}
     exec(re.search(r"```python\n(.*?)```", text, re.DOTALL)[1], found)  # type: ignore[index]
     robot, points, along = found["robot"], found["points"], found["along"]

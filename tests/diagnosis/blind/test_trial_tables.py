@@ -6,27 +6,27 @@ from pathlib import Path
 import pytest
 import trial_tables
 
-DOCS = Path(__file__).resolve().parents[3] / "docs"
+DOCS = Path(__file__).resolve().parents[3] / "docs" / "validation"
 PAGE = DOCS / "blind_trial.md"
 
 
 @pytest.fixture(scope="module")
 def rows():
-    return trial_tables.read_rows(DOCS / "blind_trial.jsonl")
+    return trial_tables.read_rows(DOCS / "data/exact.jsonl")
 
 
 def test_the_page_says_what_the_rows_say(rows):
     assert trial_tables.printed(rows) in PAGE.read_text(), (
-        "python benchmarks/blind_trial.py --out docs/blind_trial.jsonl --summary "
-        "--page docs/blind_trial.md brings the page up to date"
+        "python benchmarks/blind_trial.py --out docs/validation/data/exact.jsonl --summary "
+        "--page docs/validation/blind_trial.md brings the page up to date"
     )
 
 
 def test_the_page_says_what_worlds_that_are_a_little_wrong_say():
     told = trial_tables.read_rows(DOCS / trial_tables.WRONG)
     assert trial_tables.printed_wrong(told) in PAGE.read_text(), (
-        "python benchmarks/blind_trial.py --out docs/blind_trial.jsonl --summary "
-        "--page docs/blind_trial.md brings the page up to date"
+        "python benchmarks/blind_trial.py --out docs/validation/data/exact.jsonl --summary "
+        "--page docs/validation/blind_trial.md brings the page up to date"
     )
 
 
@@ -83,7 +83,7 @@ def test_the_curve_counts_the_cases_that_every_way_was_given_at_every_mismatch(t
 def test_the_page_has_the_curve_that_its_rows_give(capsys):
     files = {"picchio": "wrong", "before": "wrong_before", "plain BIC": "wrong_plain_bic"}
     ways = {
-        way: trial_tables.read_rows(DOCS / f"blind_trial_{name}.jsonl")
+        way: trial_tables.read_rows(DOCS / "data" / f"{name}.jsonl")
         for way, name in files.items()
     }
     trial_tables.print_curve(ways)

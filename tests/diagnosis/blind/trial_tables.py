@@ -1,4 +1,4 @@
-"""The tables of the blind trial: what docs/blind_trial.md says was printed by them."""
+"""The tables of the blind trial: what docs/validation/blind_trial.md prints."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import math
 from collections import Counter, defaultdict
 from contextlib import redirect_stdout
 from io import StringIO
+from pathlib import Path
 
 from picchio.core.files import atomic_write
 
@@ -15,17 +16,22 @@ UNNAMEABLE = {"outside": "out of the catalogue", "left-out": "true cause taken o
 BEGIN, END = "<!-- tables: printed, not written -->", "<!-- end of the tables -->"
 BESIDE = "<!-- {}: printed, not written -->", "<!-- end of {} -->"
 # Worlds that are a little wrong everywhere: the rows, the draws and mismatches that the page tells.
-WRONG = "blind_trial_wrong.jsonl"
+WRONG = "data/wrong.jsonl"
 LAST_DRAWS = range(90000, 92000), (1.0, 2.0)
 IN_WRONG = "<!-- wrong everywhere: printed -->", "<!-- end of wrong everywhere -->"
-SIMPLER = "blind_trial_score_test.jsonl", "blind_trial_plain_bic.jsonl"
+SIMPLER = "data/score_test.jsonl", "data/plain_bic.jsonl"
+# What the tables need of a row: of exact worlds, and of those that are a little wrong.
+NEEDED = ("case", "robot", "kind", "snr", "truth", "verdict", "claimed", "right", "errors", "salt",
+          "commit")  # fmt: skip
+NEEDED_EXACT = "explained", "removed", "burst", "follow_up", "cpu_seconds"
+NEEDED_WRONG = "mismatch", "sensors", "outcome", "known", "lives", "seconds"
 ENOUGH = 30.0  # chi-square from which a measurement is foretold to tell causes apart
 REMOVED = {40: 0.99, 20: 0.95}  # asked for, by SNR
 WITHIN = {"peak": 0.01, "life": 0.05}  # of a burst that nobody measured
 
 
-def summary(rows):
-    """Print everything."""
+def summary(rows, cases=False):
+    """Print all tables, and every case that was not right where `cases`."""
     rows = [row for row in rows if not _aside(row)]
     print_kinds(rows)
     print_draws(rows)
@@ -38,13 +44,30 @@ def summary(rows):
     print_bursts(known)
     print_sets(rows)
     print_times(rows)
-    print_confusion(rows)
-    print_wrong(rows)
+    if cases:
+        print_confusion(rows)
+        print_wrong(rows)
 
 
 def read_rows(path):
     """A file of rows, one line of JSON each."""
     return [json.loads(line) for line in path.read_text().splitlines() if line]
+
+
+def thinned(rows):
+    """What the tables need of each row, numbers to four digits."""
+
+    def short(value):
+        if isinstance(value, dict):
+            return {key: short(each) for key, each in value.items()}
+        if isinstance(value, list):
+            return [short(each) for each in value]
+        return float(f"{value:.4g}") if isinstance(value, float) else value
+
+    def needed(row):
+        return (*NEEDED, *(NEEDED_WRONG if "mismatch" in row else NEEDED_EXACT))
+
+    return [{key: short(row[key]) for key in needed(row) if key in row} for row in rows]
 
 
 def printed(rows):
@@ -86,9 +109,9 @@ def into_page(rows, page):
     blocks = [(BEGIN, END, printed(rows))]
     if (page.parent / WRONG).exists():
         blocks.append((*IN_WRONG, printed_wrong(read_rows(page.parent / WRONG))))
-    for name in SIMPLER:
+    for name in map(Path, SIMPLER):
         if (page.parent / name).exists():
-            marks = (mark.format(name) for mark in BESIDE)
+            marks = (mark.format(name.name) for mark in BESIDE)
             blocks.append((*marks, printed_against(rows, page.parent / name)))
     text = page.read_text()
     for begin, end, block in blocks:
@@ -223,7 +246,7 @@ def print_gains(rows):
         if shares:
             print(
                 f"removed of what the true model removes there, at {snr} dB: median "
-                f"{quantile(shares, 0.5):.5f}, 5th percentile {quantile(shares, 0.05):.4f}, lowest "
+                f"{quantile(shares, 0.5):.4f}, 5th percentile {quantile(shares, 0.05):.4f}, lowest "
                 f"{shares[0]:.4f}; {sum(s >= least for s in shares)} of {len(shares)} at least "
                 f"{least:g}"
             )
@@ -325,6 +348,14 @@ def print_mismatch(rows):
             f"{count['wrong']:>7}{count['undecided']:>11}{alarms:>8}{named:>7}"
             f"{inside[0]:>9}{inside[1]:>9}{median:>9}"
         )
+
+
+def print_outcomes(rows):
+    """How many were right, by kind, all robots and sensors together."""
+    for kind in dict.fromkeys(row["kind"] for row in rows):
+        of_kind = [row for row in rows if row["kind"] == kind]
+        count = Counter(row.get("outcome", "undecided") for row in of_kind)
+        print(f"{kind}: {count['right']} of {len(of_kind)} right, {count['wrong']} wrong")
 
 
 CURVE = ("right", "undecided", "wrong")
@@ -429,8 +460,8 @@ def print_known(rows):
             )
 
 
-def mismatch_summary(rows):
-    """Everything about worlds that are a little wrong: the table, bursts, what was said."""
+def mismatch_summary(rows, cases=False):
+    """Worlds that are a little wrong: the tables, and every case not right where `cases`."""
     print_mismatch(rows)
     told = [row for row in rows if not _aside(row)]
     # Intervals are asked to hold where errors are as large as the diagnosis takes them to be.
@@ -438,8 +469,10 @@ def mismatch_summary(rows):
     for size in sizes:
         if len(sizes) > 1:
             print(f"everything off by {size:g} times its tolerance:")
-        print_known([row for row in told if row["mismatch"] == size])
-    for row in told:
+        of_size = [row for row in told if row["mismatch"] == size]
+        print_outcomes(of_size)
+        print_known(of_size)
+    for row in told if cases else ():
         if row.get("outcome", "undecided") != "right":
             said = [row["verdict"], row["claimed"], row.get("leads", [])]
             print(row.get("outcome", "undecided") + ":", row["case"], row["truth"], "->", *said)

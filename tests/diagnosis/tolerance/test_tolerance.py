@@ -651,7 +651,7 @@ def test_worlds_that_are_a_little_wrong_everywhere(kind, draw, tmp_path):
 def test_single_causes_that_another_stood_for(draw, alone):
     """What was named, or found far off, in worlds a little wrong before it was settled by itself.
 
-    Seen while mending; the numbers of blind draws are in docs/diagnosis.md.
+    Seen while mending; the numbers of blind draws are in docs/validation.
     """
     sensors = {"sensors": ["accelerometer.tool"]} if alone else {}
     case = {"robot": ARM, "kind": "single", "snr": 40, "draw": draw, "mismatch": 1.0, **sensors}

@@ -3,7 +3,7 @@
 Nobody publishes the stiffness of most robots' joints. What a URDF has (inertias, weight, levers,
 limits), and what a user may know (payload, reach, class of drives, reducers), predict it within a
 factor of about two. The distribution is fitted to joints that were measured; which, how, and how
-well it foretells a robot left out: docs/priors.md.
+well it foretells a robot left out: docs/validation/priors.md.
 """
 
 from __future__ import annotations
