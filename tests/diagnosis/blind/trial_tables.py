@@ -162,7 +162,7 @@ def print_draws(rows):
             print(f"right, draw by draw, {kind}, {snr} dB: {', '.join(told)}")
     weak = [row for row in rows if row["kind"] == "weak" and row["claimed"]]
     if weak:
-        print(f"weak: where anything is told, it holds the truth in "
+        print(f"weak: where anything is claimed, it includes the truth in "
               f"{sum(row['right'] for row in weak)} of {len(weak)}")  # fmt: skip
 
 
@@ -280,21 +280,21 @@ def print_sets(rows):
     claimed = [row for row in few if row["claimed"]]
     print(
         f"three records, no deflections: {len(claimed)} of {len(few)} claimed, the truth among "
-        f"what is told in {sum(row['right'] for row in claimed)}; "
-        f"{sum(row['verdict'] == 'ambiguous' for row in few)} told as sets"
+        f"the sets in {sum(row['right'] for row in claimed)}; "
+        f"{sum(row['verdict'] == 'ambiguous' for row in few)} ambiguous"
     )
     poor = [row for row in rows if row["kind"] == "sets"]
     if poor:
         print(
-            f"records that leave sets: {len(poor)}, the truth among what is told in "
+            f"records that leave sets: {len(poor)}, the truth among the sets in "
             f"{sum(row['right'] for row in poor)}; "
-            f"{sum(row['verdict'] == 'ambiguous' for row in poor)} told as sets"
+            f"{sum(row['verdict'] == 'ambiguous' for row in poor)} ambiguous"
         )
     asked = [row["follow_up"] for row in (*few, *poor) if row.get("follow_up")]
     can = [f for f in asked if _foretold(f)]
     done = sum(f["verdict"] == "named" and f["right"] and not f["alternatives"] for f in can)
     print(
-        f"next measurement: foretold to tell all apart in {len(can)} of {len(asked)}; taken, it "
+        f"next measurement: predicted to separate all in {len(can)} of {len(asked)}; taken, it "
         f"named the cause alone in {done} of them"
     )
     nulls = [row for row in rows if row["kind"] == "few-null"]
