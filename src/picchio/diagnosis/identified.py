@@ -144,7 +144,7 @@ class Identification(TableResult):
     def sidecar_text(self) -> str:
         """The robot's sidecar with the values that were found in it, for `--flex`.
 
-        Values have their spreads, and `[posterior]` says how these hang together; everything else
+        Values have their spreads, and `[posterior]` says how these are correlated; everything else
         of the joints stays as it was.
         """
 

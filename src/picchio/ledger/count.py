@@ -383,7 +383,7 @@ def recount(book: Ledger, model: Model, curves: Sequence[SNCurve | None], task: 
 
 
 Streams = list[tuple[Stream, IndexArray]]
-"""With (s, 2) ns, the time that a surer one saw."""
+"""With (s, 2) ns, the time that a more certain one saw."""
 
 
 def streams_of(book: Ledger) -> tuple[Streams, IndexArray]:

@@ -50,7 +50,7 @@ class FlexibleRobot:
         warnings: what was warned of while it was loaded.
         findings: what is impossible or doubtful about its own numbers; among the warnings, too.
         spreads: how well values are known, by name such as "stiffness.joint_1".
-        posterior: how these hang together, or None.
+        posterior: how these are correlated, or None.
     """
 
     name: str

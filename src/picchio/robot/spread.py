@@ -256,7 +256,7 @@ def spreads_in(
 
 
 class Posterior(StrictModel):
-    """How values that were found from the same data hang together.
+    """How values that were found from the same data are correlated.
 
     Attributes:
         names: values with a spread, such as "stiffness.joint_1", "damping_ratio.joint_2",
@@ -319,7 +319,7 @@ def root_of(names: Collection[str], posterior: Posterior | None) -> np.ndarray:
 
     Args:
         names: n values.
-        posterior: what is known of how they hang together; None: not at all.
+        posterior: their correlation; None: not at all.
     """
     every = list(names)
     matrix = np.eye(len(every))

@@ -190,7 +190,7 @@ def start(
     Args:
         robot: a name from `picchio.robots()`, or a path to a URDF.
         tool: the frame on which the tool's force acts.
-        payload: kg, rated; it makes the estimates surer.
+        payload: kg, rated; it makes the estimates more certain.
         reach: m, rated, where the URDF's is not right.
         drive_class: strain-wave, cycloidal, planetary, direct or ball-screw.
         reducers: a catalogue's reducers by joint.

@@ -116,7 +116,7 @@ class SNCurve:
 
     @property
     def endurance_limit(self) -> float | None:
-        """Pa, the amplitude below which constant-amplitude life has no end, or None."""
+        """Pa, the amplitude below which constant-amplitude life is unlimited, or None."""
         return float(self._knots[-1]) if len(self.knees) == len(self.slopes) else None
 
     @property

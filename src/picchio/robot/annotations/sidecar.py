@@ -52,7 +52,7 @@ xyz = [0.0, 0.0, 0.0]        # m
 rpy = [0.0, 0.0, 0.0]        # rad
 gravity = [0.0, 0.0, -9.81]  # m/s^2, world
 
-[posterior]                  # optional: how values with a spread hang together
+[posterior]                  # optional: how values with a spread are correlated
 names = ["stiffness.elbow_joint", "mass.tool"]
 correlation = [[1.0, -0.3], [-0.3, 1.0]]
 ```
@@ -149,7 +149,7 @@ class Sidecar(StrictModel):
         link: masses in place of the URDF's, by its links' names.
         links: a total mass, spread over the links by the volume of their shapes.
         base: how the robot stands.
-        posterior: how values with a spread hang together.
+        posterior: how values with a spread are correlated.
     """
 
     robot: str | None = None

@@ -8,7 +8,7 @@ The logarithm y of quantity i of a joint is
 with x the joint's place in the chain; V of what is asked for (the first quantities) has g added,
 the shift of the robot's class of drives. So each quantity tells of the sizes D and d as well as its
 scatter lets it, on each level; together they predict what is asked for, and errors of one robot
-hang together through D and u. It is factor analysis on two levels. A quantity that is not known is
+correlated through D and u. It is factor analysis on two levels. A quantity that is not known is
 not there: nothing is filled in. A class that is not known is drawn, too, with probabilities that
 the robots teach. Priors: normal ones, wide against what is seen, for m, C, a, b; of given spread
 for g; half-t scales (Gelman, Bayesian Analysis 1, 2006, 515-533), how large in general is learned

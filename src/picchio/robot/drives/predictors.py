@@ -27,10 +27,10 @@ QUANTITIES = (
 )
 """What is read of a joint, in the order of the columns; `meaning` has it in words."""
 OF_STIFFNESS = ("inertia", "gravity_torque", "payload")
-"""Of these, what foretells the stiffness. Levers and limits made the prediction worse, as robots
+"""Of these, what predicts the stiffness. Levers and limits made the prediction worse, as robots
 that were left out tell (`python benchmarks/drive_priors.py --nested`)."""
 OF_EFFORT = ("inertia", "gravity_torque", "lever", "speed", "payload")
-"""What foretells an effort limit that is not known."""
+"""What predicts an effort limit that is not known."""
 
 meaning = {
     "inertia": "the inertia it carries when the arm is stretched",

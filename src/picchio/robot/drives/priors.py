@@ -3,7 +3,7 @@
 Nobody publishes the stiffness of most robots' joints. What a URDF has (inertias, weight, levers,
 limits), and what a user may know (payload, reach, class of drives, reducers), predict it within a
 factor of about two. The distribution is fitted to joints that were measured; which, how, and how
-well it foretells a robot left out: docs/validation/priors.md.
+well it predicts a robot left out: docs/validation/priors.md.
 """
 
 from __future__ import annotations
@@ -164,7 +164,7 @@ class DrivePriors(Result):
         )  # fmt: skip
 
     def posterior(self) -> Posterior:
-        """How the logarithms hang together, as `[posterior]` of a sidecar has it."""
+        """How the logarithms are correlated, as `[posterior]` of a sidecar has it."""
         n = len(self.joints)
         whole = np.zeros((3 * n, 3 * n))
         whole[: 2 * n, : 2 * n] = self.torque_covariance
@@ -363,7 +363,7 @@ def with_reducer(
         shares: joint's over reducer's stiffness, of robots that were measured; all below 1.
 
     Returns:
-        the parts, weighed and moved; what moves the joint moves those that hang together with it.
+        the parts, weighed and moved; what moves the joint moves those correlated with it.
 
     Raises:
         InputError: a stiffness far below all that the joint may have.
@@ -426,7 +426,7 @@ def _strength_reasons(
     told = (
         f"from {meaning['effort']}, {math.exp(effort):.3g} N m"
         if np.isfinite(effort)
-        else f"no effort limit is known{f' ({refused})' if refused else ''}: it is foretold from "
+        else f"no effort limit is known{f' ({refused})' if refused else ''}: it is predicted from "
         "what the joint moves and holds"
     )
     return [

@@ -1,6 +1,6 @@
 """What a drive probably bears: rated, repeated-peak and momentary torque, where nobody says.
 
-The effort limit of a joint (from the URDF, else foretold with the stiffness from inertias, weight,
+The effort limit of a joint (from the URDF, else predicted with the stiffness from inertias, weight,
 levers and speed) lies somewhere between its reducer's rated torque and the limit for repeated
 peaks: makers choose it so, and none says where. The catalogues tell how far apart the two are. So
 the logarithm of repeated-peak torque over effort limit is taken as normal, with the two ends one
@@ -30,7 +30,7 @@ _COMMON = 0.5
 
 @dataclass(frozen=True)
 class TorqueRatios:
-    """How the torques of reducers hang together, medians of the catalogues.
+    """How the torques of reducers are correlated, medians of the catalogues.
 
     Attributes:
         peak_over_rated: limit for repeated peaks over rated torque.

@@ -35,7 +35,7 @@ damping ratio is that of the few robots of which it is known.
 To enter what you know, change the number and its spread: 1.05 says that you know it to 5 %.
 Say in `source` where it is from. `picchio formats sidecar` lists all that may stand here."""
 _POSTERIOR = """\
-How the estimates hang together: where one joint is stiffer than estimated, its neighbours
+How the estimates are correlated: where one joint is stiffer than estimated, its neighbours
 probably are, too. One row for each name. There is no need to edit it; without it the
 estimates count as independent. A name whose spread you delete must go, with its row and
 its column."""

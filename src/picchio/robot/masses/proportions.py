@@ -1,6 +1,6 @@
 """An arm's numbers against each other: which are out of proportion, and which unit explains them.
 
-Lengths, masses, inertias and angles of real arms hang together: an arm's mass grows with its length
+Lengths, masses, inertias and angles of real arms correlate: an arm's mass grows with its length
 cubed, a link's radius of gyration with its own size. A file in millimetres or grams breaks that by
 powers of ten. Each number has a normal distribution of its logarithm, from some 170 public
 URDFs of arms; the units under which all of them together are most probable are the likely cause.

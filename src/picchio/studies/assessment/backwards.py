@@ -67,7 +67,7 @@ class Allowable:
             are allowed.
         life: rivets to failure of the shaft as things are, at that survival; NaN without a shaft.
         met: whether every part of the joint holds as things are; None where it has none.
-        most_rivets: the most rivets that may be wanted; None where there is no end.
+        most_rivets: the most rivets that may be wanted; None if unlimited.
         governed_by: shaft, yield or reducer: the part that limits the force; "" where none does.
         reducer: the smallest of the catalogues that bears the torque; None where none does, and
             of a slide.
@@ -109,13 +109,13 @@ class AllowableLoads(TableResult):
         notes: what was left out, and why.
         force_factor: the least of the joints'.
         force: N, of the strongest blows, by which the whole robot just holds; the blows of all
-            operations are scaled alike. Inf where there is no end.
+            operations are scaled alike. Inf if unlimited.
         hits: blows a rivet may take; as in `Allowable`.
         contrary: why the answer cannot be told whatever the parts bear; "" where it can.
         steel: the S-N curve for the radius where a joint has no shaft.
         held: share of the drawn cases in which every part holds, where a value of the robot has a
             spread; None otherwise. A yes needs `SURE` of them.
-        intervals: P10 and P90 in these cases: of "force", N, "hits" and "rivets" (None: no end),
+        intervals: P10 and P90 in these cases: of "force", N, "hits" and "rivets" (None: unlimited),
             and of each joint's "peak_torque" and "reducer"; empty without spreads.
         estimated: what the drives bear is picchio's own estimate.
     """
@@ -171,7 +171,7 @@ class AllowableLoads(TableResult):
 
     @property
     def rivets(self) -> int | None:
-        """The most rivets that may be wanted; None where there is no end."""
+        """The most rivets that may be wanted; None if unlimited."""
         known = [joint.most_rivets for joint in self.joints if joint.most_rivets is not None]
         return min(known, default=None)
 
@@ -281,7 +281,7 @@ def told_ends(ends: tuple[float | None, float | None]) -> str:
     """An interval as people read it.
 
     Args:
-        ends: P10 and P90; None or inf is no end.
+        ends: P10 and P90; None or inf is unlimited.
 
     Returns:
         such as "320 to 610", "320 to no end" or "no end".
@@ -668,7 +668,7 @@ class _Backwards:
         return None if found is None else found.name
 
     def _most_rivets(self, k: int) -> int | None:
-        """The largest number of rivets that the joint survives; None: no end."""
+        """The largest number of rivets that the joint survives; None: unlimited."""
         part, load, per_pass = self.parts[k], self.load(k), self.task.rivets_per_pass
         if max(part.scores(load, math.inf).values(), default=0.0) > 0.0:
             return 0  # beyond what no shorter life changes

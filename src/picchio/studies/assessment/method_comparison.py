@@ -31,7 +31,7 @@ class Term:
         rivets_to_failure: of the robot, its weakest shaft.
         limiting_joint: which that is; None where nothing fails.
         against: the term that differs in this assumption alone; None for the first.
-        factor: this life over that one; inf or NaN where one has no end.
+        factor: this life over that one; inf or NaN where one is unlimited.
     """
 
     name: str

@@ -113,7 +113,7 @@ class JointLife:
         reducer_utilisation: largest torque, gravity and blows together, over the limit that binds;
             NaN without a reducer or an estimate of what the drive bears.
         damage_per_rivet: mean over the rivets of the task's mix.
-        rivets_to_failure: all rivets of the mix; infinite where the life has no end.
+        rivets_to_failure: all rivets of the mix; infinite where the life is unlimited.
         sn_curve: name of the shaft's or the drive's curve; empty without either.
         estimated_drive: its torque limits are an estimate, since no reducer is named.
         worn: whose fatigue the life is: "shaft" or "drive"; empty without either.
@@ -235,7 +235,7 @@ class JointLife:
 
     @property
     def life(self) -> float:
-        """Rivets to failure; infinite where a shaft has no end, or no shaft is known."""
+        """Rivets to failure; infinite where a shaft never fails, or no shaft is known."""
         return self.rivets_to_failure if self.sn_curve else float("inf")
 
     @property
@@ -302,7 +302,7 @@ class Assessment(TableResult):
         operations: one entry an operation.
         limiting_joint: shortest life, or largest utilisation where no life has an end; None
             where no joint has a shaft.
-        rivets_to_failure: of the limiting joint; infinite where the life has no end.
+        rivets_to_failure: of the limiting joint; infinite where the life is unlimited.
         steady_state: what the steady state misjudges, one entry a joint.
         assumptions: what was taken for granted, a sentence each.
         origins: where each value of the robot came from.

@@ -22,7 +22,7 @@ class JointUse:
 
     Attributes:
         name: of the joint.
-        rivets_to_failure: of the mix; infinite where the life has no end or is not known.
+        rivets_to_failure: of the mix; infinite where the life is unlimited or is not known.
         utilisation: largest over the rivet places; of the shaft or the reducer, or of the URDF's
             effort limit where no joint has either.
     """
@@ -127,7 +127,7 @@ class Off:
 
     Attributes:
         shift: (3,) m.
-        rivets_to_failure: infinite where the life has no end; NaN where it cannot be reached.
+        rivets_to_failure: infinite where the life is unlimited; NaN where it cannot be reached.
         utilisation: NaN where it cannot be reached.
     """
 

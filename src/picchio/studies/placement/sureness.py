@@ -24,7 +24,7 @@ class Sureness:
     """What uncertain values of the robot leave of a gain. Intervals are P10 to P90.
 
     A value that both places share, such as a joint's stiffness, is the same at both in each case:
-    so the gain is surer than either life.
+    so the gain is more certain than either life.
 
     Attributes:
         cases: how many were drawn.
@@ -113,7 +113,7 @@ def sureness(loads: Loads, work: Work, start: Spot, best: Spot) -> Sureness | No
 
 
 def surest(loads: Loads, work: Work, spots: Sequence[Spot]) -> Spot | None:
-    """Of several places the one that is the best in most drawn cases: that is surer than its life.
+    """Of several places the one that is best in most drawn cases, more certain than any life.
 
     Args:
         loads: of the robot on its task.

@@ -29,7 +29,7 @@ class LifeScan:
 
     Attributes:
         factor: (k,) on the stiffness.
-        life: (k,) rivets of the task's mix; infinite where the life has no end.
+        life: (k,) rivets of the task's mix; infinite where the life is unlimited.
     """
 
     factor: FloatArray
@@ -132,7 +132,7 @@ class UncertainLife(TableResult):
 
     @property
     def decades(self) -> float:
-        """Width from P10 to P90 of the robot's life, powers of ten; NaN where it has no end."""
+        """Width from P10 to P90 of the robot's life, powers of ten; NaN where it is unlimited."""
         low, high = self.robot.p10, self.robot.p90
         if not (low > 0.0 and high < math.inf):
             return math.nan

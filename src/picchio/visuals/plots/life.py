@@ -211,7 +211,7 @@ def plot_life_spread(spread: UncertainLife, ax: Axes | None = None) -> Axes:
 
 @styled
 def plot_life_scan(name: str, scan: LifeScan, ax: Axes | None = None) -> Axes:
-    """The robot's life (rivets) against a factor on one stiffness; it breaks where it has no end.
+    """The robot's life (rivets) against a factor on one stiffness; it breaks where it is unlimited.
 
     Args:
         name: of the stiffness, such as "stiffness.joint_2".
