@@ -83,8 +83,7 @@ def test_the_curve_counts_the_cases_that_every_way_was_given_at_every_mismatch(t
 def test_the_page_has_the_curve_that_its_rows_give(capsys):
     files = {"picchio": "wrong", "before": "wrong_before", "plain BIC": "wrong_plain_bic"}
     ways = {
-        way: trial_tables.read_rows(DOCS / "data" / f"{name}.jsonl")
-        for way, name in files.items()
+        way: trial_tables.read_rows(DOCS / "data" / f"{name}.jsonl") for way, name in files.items()
     }
     trial_tables.print_curve(ways)
     assert capsys.readouterr().out.rstrip() in PAGE.read_text()
