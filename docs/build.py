@@ -31,6 +31,14 @@ ELSEWHERE = {
     ROOT / "notebooks": "notebooks/index.md",
     EXAMPLES: "gallery.md",
 }
+# What is made here, and what the first page says of it where the site is not built.
+REFERENCE = {
+    "commands": "reference/commands",
+    "file formats": "reference/formats",
+    "effects": "reference/effects",
+    "Python": "api/index",
+}
+NOT_BUILT = "commands, file formats, effects, Python: in the site that `python docs/build.py` makes"
 PARTS = {
     "Start": ("readme", "gallery"),
     "Tutorials": ("tutorial/assess", "tutorial/own_robot", "tutorial/diagnose"),
@@ -48,7 +56,7 @@ PARTS = {
             "planner_cost",
         )
     ),
-    "Reference": ("reference/commands", "reference/formats", "reference/effects", "api/index"),
+    "Reference": tuple(REFERENCE.values()),
     "Explanation": tuple(
         f"explanation/{name}"
         for name in (
@@ -117,8 +125,13 @@ def main() -> int:
         if path.is_file():
             page.parent.mkdir(parents=True, exist_ok=True)
             page.write_text(relink(path, pages), encoding="utf-8")
-    with (SOURCE / "index.md").open("a", encoding="utf-8") as stream:
-        stream.writelines(toctree(caption, entries) for caption, entries in PARTS.items())
+    first = SOURCE / "index.md"
+    before, mark, rest = first.read_text(encoding="utf-8").partition(NOT_BUILT)
+    if not mark:
+        raise SystemExit(f"docs: index.md does not say: {NOT_BUILT}")
+    made = ", ".join(f"[{name}]({page}.md)" for name, page in REFERENCE.items())
+    trees = "".join(toctree(caption, entries) for caption, entries in PARTS.items())
+    first.write_text(before + made + rest + trees, encoding="utf-8")
     notebooks = sorted((ROOT / "notebooks").glob("*.ipynb"))
     for path in notebooks:
         shutil.copy(path, SOURCE / "notebooks")
@@ -176,6 +189,7 @@ def gallery_page() -> str:
     for path in sorted(EXAMPLES.glob("*.py")):
         code = path.read_text(encoding="utf-8")
         title, _, detail = ast.get_docstring(ast.parse(code)).partition("\n")
+        title = title.removesuffix(".")
         picture = f"images/gallery/{path.stem}.png"
         draw(path, SOURCE / picture)
         cells.append(f"[![{title}]({picture})](#{path.stem})")

@@ -1,4 +1,4 @@
-"""Takes the pictures of the README anew: `python docs/pictures.py`; needs chromium."""
+"""Takes the pictures of README and guides anew: `python docs/pictures.py`; needs chromium."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import warnings
 from pathlib import Path
 
 import numpy as np
+from examples import GL
 from PIL import Image
 from playwright.sync_api import Page, sync_playwright
 
@@ -23,7 +24,6 @@ from picchio.visuals.scene.scene import Scene
 from picchio.visuals.worst_rivet import worst_rivet
 
 HERE = Path(__file__).resolve().parent / "images"
-GL = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 GUN = """format = "picchio-sidecar/1"
 tool = { frame = "tool", axis = [1.0, 0.0, 0.0] }
 gun = { mass = 3.0, recoil_stiffness = 3e4, damping_ratio = 0.1 }
