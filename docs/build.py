@@ -53,6 +53,7 @@ PARTS = {
             "place",
             "report",
             "explore",
+            "python",
             "planner_cost",
         )
     ),
