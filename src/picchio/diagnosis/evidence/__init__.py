@@ -1,0 +1,1 @@
+"""One model of probability for all measured data: algebra, estimator, search, verdict."""

@@ -1,0 +1,1 @@
+"""Percussion records as a likelihood."""

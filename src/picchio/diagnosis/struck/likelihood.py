@@ -1,0 +1,335 @@
+"""Percussion records under one hypothesis: residuals by the full model, slopes by the linear one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from picchio.core.arrays import BoolArray, FloatArray
+from picchio.core.errors import InputError
+from picchio.diagnosis.evidence.estimate import Prior
+from picchio.diagnosis.evidence.numbers import Numbers
+from picchio.diagnosis.percussion.data.problem import (
+    MeasuredRecord,
+    Problem,
+    near_edges,
+    residual,
+)
+from picchio.diagnosis.percussion.fit.unknowns import Hypothesis as Old
+from picchio.diagnosis.percussion.tolerance.nudges import Inexact, inexact, nudged
+from picchio.diagnosis.struck.causes import Cause, EffectNumber, cause_of
+from picchio.model.effects.effect import Effect
+from picchio.model.model import Model
+
+_ONCE_A_POSE = ("pose_repeat", "damping_by_mode")
+
+
+@dataclass(frozen=True, eq=False)
+class Data:
+    """A campaign's records and everything in them that is never exact.
+
+    Attributes:
+        problem: robot, records, noise.
+        base: the fitted values of the files: stiffness, damping, force.
+        shared: numbers of the campaign.
+        groups: of a pose, as its first record has them.
+        own: of each record, with the blow that each belongs to, or -1.
+    """
+
+    problem: Problem
+    base: tuple[Cause, ...]
+    shared: tuple[Inexact, ...]
+    groups: tuple[tuple[Inexact, ...], ...]
+    own: tuple[tuple[tuple[Inexact, int], ...], ...]
+
+    @classmethod
+    def of(cls, problem: Problem) -> Data:
+        """From a problem."""
+        old = Old.nominal(problem)
+        tolerance = problem.campaign.tolerance
+        base = []
+        for effect in old.effects:
+            sigma = old.known.sigma(effect.label)
+            if sigma is None:
+                sigma = float(getattr(tolerance, effect.tolerance))
+            cause = cause_of(effect, [], tolerance)
+            base.append(replace(cause, numbers=tuple(replace(n, std=max(sigma, 1e-6)) for n in cause.numbers)))
+        lists = [inexact(problem, r, tolerance, measured=False) for r in problem.records]
+        shared: dict[str, Inexact] = {}
+        groups: dict[int, tuple[Inexact, ...]] = {}
+        own = []
+        for record, found in zip(problem.records, lists, strict=True):
+            for one in found:
+                if one.once:
+                    shared.setdefault(one.name, one)
+            groups.setdefault(record.pose, tuple(o for o in found if o.key in _ONCE_A_POSE))
+            mine: list[tuple[Inexact, int]] = []
+            for one in found:
+                if one.once or one.key in _ONCE_A_POSE:
+                    continue
+                if one.each_blow:
+                    hits = np.unique(record.setup.blows.hit).size
+                    first = 1 if one.key == "blow_time" else 0
+                    mine += [(one, k) for k in range(first, hits)]
+                else:
+                    mine.append((one, -1))
+            own.append(tuple(mine))
+        return cls(problem, tuple(base), tuple(shared.values()),
+                   tuple(groups[p] for p in sorted(groups)), tuple(own))
+
+    chosen: tuple[int, ...] | None = None
+
+    @cached_property
+    def records(self) -> list[MeasuredRecord]:
+        """The records."""
+        every = self.problem.records
+        return every if self.chosen is None else [every[k] for k in self.chosen]
+
+    def only(self, chosen: Sequence[int]) -> Data:
+        """Some of the records."""
+        return replace(self, chosen=tuple(chosen), own=tuple(self.own[k] for k in chosen))
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """A number that an effect draws anew in every record, or for every blow of one.
+
+    Attributes:
+        cause: whose number it is.
+        size: its standard deviation beforehand, SI.
+        later: whether it is by how much a blow comes late.
+    """
+
+    cause: Cause
+    size: float
+    later: bool
+    means: str = ""
+    name: str = ""
+
+
+Own = tuple[Inexact | Drawn, int]
+
+
+@dataclass(frozen=True, eq=False)
+class Percussion:
+    """The records under a hypothesis, up to a time.
+
+    Attributes:
+        data: records and numbers.
+        causes: of the hypothesis.
+        end: s; None for all.
+        edges: where samples near a jump are left out: (record) -> masks.
+    """
+
+    data: Data
+    causes: tuple[Cause, ...] = ()
+    end: float | None = None
+    edges: tuple[dict[str, BoolArray] | None, ...] = ()
+    light: bool = False
+
+    def __post_init__(self) -> None:
+        if not self.edges:
+            object.__setattr__(self, "edges", self._edges([c.effect for c in self._base()] + [c.effect for c in self.causes]))
+
+    def _base(self) -> list[Cause]:
+        return [c for c in self.data.base if c.label not in self._labels]
+
+    @cached_property
+    def _labels(self) -> frozenset[str]:
+        return frozenset(c.label for c in self.causes)
+
+    def own(self, k: int) -> list[Own]:
+        """A record's own numbers, each with the blow or the place that it belongs to, or -1."""
+        found: list[Own] = [o for o in self.data.own[k] if o[0].means not in self._labels]
+        for cause in self.causes:
+            latent = cause.effect.latent
+            if latent is None or latent.whole:
+                continue
+            hits = np.unique(self.data.records[k].setup.blows.hit).size
+            one = Drawn(cause, cause.effect.values[latent.spread], latent.times)
+            found += [(one, i) for i in range(latent.first, latent.size(hits))]
+        return found
+
+    def _edges(self, effects: Sequence[Effect]) -> tuple[dict[str, BoolArray] | None, ...]:
+        model = self.data.problem.model.with_effects(effects)
+        return tuple(near_edges(r.until(self.end), model, r.smeared) for r in self.data.records)
+
+    # Layout -----------------------------------------------------------------------------------
+    @cached_property
+    def effect_numbers(self) -> list[tuple[Cause, EffectNumber]]:
+        """Of the shared numbers, first those of effects."""
+        return [(c, n) for c in (*self._base(), *self.causes) for n in c.numbers]
+
+    @cached_property
+    def inexact(self) -> list[Inexact]:
+        """Then what is never exact, but what a cause stands for."""
+        return [one for one in self.data.shared if one.means not in self._labels]
+
+    @cached_property
+    def names(self) -> list[str]:
+        """Of the shared numbers."""
+        return [f"{c.label}.{n.parameter}" for c, n in self.effect_numbers] + [o.name for o in self.inexact]
+
+    @cached_property
+    def prior(self) -> Prior:
+        """Of all numbers."""
+        numbers = [n for _, n in self.effect_numbers]
+        k = len(self.inexact)
+        tiny = 1e-6 if self.light else 1.0
+        std = np.array([n.std for n in numbers] + [tiny] * k)
+        mean = np.array([n.mean for n in numbers] + [0.0] * k)
+        low = np.array([n.low for n in numbers] + [0.0 if o.one_way and not o.each_blow else -np.inf for o in self.inexact])
+        high = np.array([n.high for n in numbers] + [np.inf] * k)
+        groups = tuple(np.full(len(g), tiny) for g in self.data.groups)
+        records = tuple(
+            np.array([tiny if isinstance(o, Inexact) else o.size for o, _ in self.own(k)])
+            for k in range(len(self.data.records))
+        )
+        zero = lambda parts: tuple(np.zeros(p.size) for p in parts)  # noqa: E731
+        return Prior(Numbers(mean, zero(groups), zero(records)), Numbers(std, groups, records), low, high)
+
+    @property
+    def group_of(self) -> list[int]:
+        """The pose of each record."""
+        return [r.pose for r in self.data.records]
+
+    @cached_property
+    def samples(self) -> list[int]:
+        """Of each record, all its channels together; what is left out counts as one each."""
+        return [r.until(self.end).samples.count * len(r.values) for r in self.data.records]
+
+    @cached_property
+    def signal(self) -> list[float]:
+        """Power of what was measured, in units of the noise, whitened."""
+        out = []
+        for r in self.data.records:
+            count = r.until(self.end).samples.count
+            total = 0.0
+            for name, values in r.values.items():
+                total += float((r.noise[name].model.whiten(values[:count]) ** 2).sum())
+            out.append(total)
+        return out
+
+    def start(self, at: Numbers | None = None, like: Percussion | None = None, **causes: Effect) -> Numbers:
+        """Numbers to begin at: those of another hypothesis where they are the same, causes as tried."""
+        known = {}
+        if at is not None and like is not None:
+            known = dict(zip(like.names, at.shared, strict=True))
+        first = []
+        for c, n in self.effect_numbers:
+            name = f"{c.label}.{n.parameter}"
+            default = c.coordinates(c.effect)[[m.parameter for m in c.numbers].index(n.parameter)]
+            first.append(known.get(name, default))
+        shared = np.array(first + [known.get(o.name, 0.0) for o in self.inexact])
+        zero = self.prior.mean
+        if at is None or like is None:
+            return Numbers(shared, zero.groups, zero.records)
+        own = []
+        for k in range(len(self.data.records)):
+            had = {(o.name if isinstance(o, Inexact) else o.cause.label, i): x
+                   for (o, i), x in zip(like.own(k), at.records[k], strict=True)}
+            own.append(np.array([had.get((o.name if isinstance(o, Inexact) else o.cause.label, i), 0.0) for o, i in self.own(k)]))
+        return Numbers(shared, at.groups, tuple(own))
+
+    # The model at a point ----------------------------------------------------------------------
+    def effects_at(self, at: Numbers) -> tuple[Effect, ...]:
+        """Effects of the files' values and of the causes."""
+        out, k = [], 0
+        for c in (*self._base(), *self.causes):
+            m = len(c.numbers)
+            effect = c.at(at.shared[k : k + m])
+            if effect.latent is not None and not effect.latent.whole:
+                effect = effect.with_hidden(self._hidden(c, at))
+            elif c.effect.hidden:
+                effect = effect.with_hidden(c.effect.hidden)
+            out.append(effect)
+            k += m
+        return tuple(out)
+
+    def _hidden(self, cause: Cause, at: Numbers) -> dict[str, tuple[float, ...]]:
+        """What a cause draws in every record."""
+        found = {}
+        latent = cause.effect.latent
+        assert latent is not None
+        for k, record in enumerate(self.data.records):
+            mine = [x for (o, _), x in zip(self.own(k), at.records[k], strict=True)
+                    if isinstance(o, Drawn) and o.cause.label == cause.label]
+            found[record.name] = (*([0.0] * latent.first), *mine)
+        return found
+
+    def moved(self, record: int, at: Numbers) -> list[tuple[Inexact, FloatArray]]:
+        """What is moved in a record, by how many standard deviations."""
+        if self.light:
+            return []
+        k = len(self.effect_numbers)
+        pose = self.data.records[record].pose
+        out = [(o, at.shared[k + i : k + i + 1]) for i, o in enumerate(self.inexact)]
+        out += [(o, at.groups[pose][i : i + 1]) for i, o in enumerate(self.data.groups[pose])]
+        blows: dict[str, tuple[Inexact, FloatArray]] = {}
+        for (o, blow), x in zip(self.own(record), at.records[record], strict=True):
+            if isinstance(o, Drawn):
+                continue
+            if blow < 0:
+                out.append((o, np.array([x])))
+                continue
+            if o.name not in blows:
+                hits = np.unique(self.data.records[record].setup.blows.hit).size
+                blows[o.name] = (o, np.zeros(hits))
+            blows[o.name][1][blow] = x
+        out += blows.values()
+        return [(o, s) for o, s in out if s.any()]
+
+    def there(self, record: int, at: Numbers, effects: Sequence[Effect]) -> tuple[MeasuredRecord, Model]:
+        """A record with its pose moved, and the model with everything in it."""
+        own = self.data.records[record]
+        moved, more = nudged(own, self.moved(record, at))
+        return moved, self.data.problem.model.with_effects((*effects, *more))
+
+    def residuals(self, at: Numbers) -> list[FloatArray]:
+        """Whitened (channels, m) of each record.
+
+        Raises:
+            InputError: no model there.
+        """
+        effects = self.effects_at(at)
+        out = []
+        for k in range(len(self.data.records)):
+            record, model = self.there(k, at, effects)
+            out.append(self.residual(k, record, model))
+        return out
+
+    def residual(self, k: int, record: MeasuredRecord, model: Model) -> FloatArray:
+        """Of one record under a model."""
+        try:
+            with np.errstate(all="ignore"):
+                rows = residual(record, model, self.end, lambda: self.edges[k])
+        except (ArithmeticError, np.linalg.LinAlgError) as error:
+            raise InputError(f"no model that can be computed: {error}") from error
+        if not np.isfinite(rows).all():
+            raise InputError("no model that can be computed: the motion diverges")
+        return rows
+
+    def some(self, at: Numbers) -> tuple[Percussion, Numbers]:
+        """One record a pose, each of another direction, and their numbers."""
+        by_pose: dict[int, list[int]] = {}
+        for k, pose in enumerate(self.group_of):
+            by_pose.setdefault(pose, []).append(k)
+        chosen = [own[i % len(own)] for i, own in enumerate(by_pose.values())]
+        data = self.data.only(chosen)
+        return (
+            replace(self, data=data, edges=()),
+            Numbers(at.shared, at.groups, tuple(at.records[k] for k in chosen)),
+        )
+
+    def about(self, at: Numbers) -> Percussion:
+        """The same with the samples left out that are near edges there."""
+        return replace(self, edges=self._edges(self.effects_at(at)))
+
+    def linearised(self, at: Numbers):
+        """The slopes there."""
+        from picchio.diagnosis.struck.slopes import Slopes
+
+        return Slopes.of(self, at)

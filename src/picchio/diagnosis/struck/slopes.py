@@ -1,0 +1,791 @@
+"""How percussion records change with every number, to first order, as weights on few series.
+
+What a linear arm answers to its blows is a sum of its modes' answers and of their changes with the
+poles (Nelson, AIAA J. 14 (1976) 1201, doi:10.2514/3.7211): about four series a mode, the same for
+all channels. A slope by a mass, a spring, a joint's angle, a sensor's place is weights on them.
+They are whitened once a channel group, and products of slopes are products of weights.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numba import njit
+
+from picchio.core.arrays import BoolArray, ComplexArray, FloatArray, IndexArray
+from picchio.core.errors import InputError
+from picchio.diagnosis.evidence.numbers import Numbers
+from picchio.diagnosis.percussion.data.problem import MeasuredRecord
+from picchio.diagnosis.percussion.tolerance.nudges import POSE, Inexact, Nudge, as_effects
+from picchio.measurement.noise.autoregression import AutoRegression
+from picchio.measurement.noise.whiten_kernel import whiten
+from picchio.model.effects.effect import Effect
+from picchio.model.model import Model
+from picchio.model.sensing import SensorChain
+from picchio.model.system import VibratingSystem
+from picchio.prediction.percussion import (
+    PercussionSetup,
+    Struck,
+    _differing,
+    _slopes_of,
+    apply_filters,
+)
+from picchio.vibration.integration.sensitivity import Strike, _Modes, blow_changes
+
+if TYPE_CHECKING:
+    from picchio.diagnosis.struck.likelihood import Percussion
+
+_STEP = 0.05  # of a standard deviation, by which a number is moved
+_TURN = 1e-4  # rad, by which a joint is
+_ALIKE = 1e-7  # of the largest pole: poles nearer than this are one
+_STRUCTURAL = ("structure", "over-time")
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """An effect at a share of its amount: its slope is per whole amount."""
+
+    effect: Effect
+    share: float
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """By how much one number changes the equations of a pose's records, per unit of the number.
+
+    Attributes:
+        mass, stiffness, damping: (n, n).
+        jacobian: (3, n) of the force.
+        moved: the system that sensors see, and how far it was moved; None where they see the same.
+    """
+
+    mass: FloatArray
+    stiffness: FloatArray
+    damping: FloatArray
+    jacobian: FloatArray
+    moved: tuple[VibratingSystem, float] | None = None
+
+    @classmethod
+    def between(
+        cls, before: VibratingSystem, after: VibratingSystem, size: float, seen: bool = False
+    ) -> Change:
+        """Of two systems with the same coordinates, `size` apart."""
+        return cls(
+            (after.mass - before.mass) / size,
+            (after.stiffness - before.stiffness) / size,
+            (after.damping - before.damping) / size,
+            (after.force_jacobian - before.force_jacobian) / size,
+            (after, size) if seen else None,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """Where the slope by one number comes from.
+
+    Attributes:
+        kind: "change" of the equations; "force": direction and size; "sensor": how a group reads;
+            "strikes": blows that come and go; "models": two predictions; "line": a sine; "none".
+        change: of the equations.
+        direction: (3,) change of the blows' direction.
+        louder: relative change of all blows.
+        chains: group -> the sensor before and after.
+        strikes: blows.
+        models: before and after.
+        size: how far these are apart.
+    """
+
+    kind: Literal["change", "force", "sensor", "strikes", "models", "line", "none"]
+    change: Change | None = None
+    direction: FloatArray | None = None
+    louder: float = 0.0
+    chains: tuple[dict[str, SensorChain], dict[str, SensorChain]] | None = None
+    strikes: tuple[Strike, ...] = ()
+    models: tuple[Model, Model] | None = None
+    size: float = 1.0
+    line: tuple[Effect, int] | None = None
+
+
+_NONE = Column("none")
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """Channels that are read, filtered and whitened alike.
+
+    Attributes:
+        rows: their places among the record's channels.
+        basis: (S, m) the series, whitened.
+        weights: (numbers, rows, S) of each number's slope.
+    """
+
+    rows: tuple[int, ...]
+    basis: FloatArray
+    weights: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class RecordSlopes:
+    """Slopes of one record.
+
+    Attributes:
+        families: of its channels.
+        explicit: (k, channels, m) whitened slopes that are no weights.
+        index: (numbers,) own, group's, shared: place of each among weights, then explicit ones.
+    """
+
+    families: tuple[Family, ...]
+    explicit: FloatArray
+    index: IndexArray
+    products: FloatArray = field(default_factory=lambda: np.zeros(0), repr=False)
+
+    def gram(self, residual: FloatArray) -> FloatArray:
+        """(numbers + 1, numbers + 1) products of all columns and the residual (channels, m)."""
+        n = self.index.size
+        out = np.empty((n + 1, n + 1))
+        out[:n, :n] = self.products_of_columns
+        weighed = np.zeros(self.families[0].weights.shape[0])
+        for f in self.families:
+            onto = residual[list(f.rows)] @ f.basis.T
+            weighed += np.tensordot(f.weights, onto, 2)
+        plain = self.explicit.reshape(len(self.explicit), -1) @ residual.ravel()
+        out[:n, n] = out[n, :n] = np.concatenate([weighed, plain])[self.index]
+        out[n, n] = float(np.vdot(residual, residual))
+        return out
+
+    @cached_property
+    def products_of_columns(self) -> FloatArray:
+        """(numbers, numbers)."""
+        count, k = self.families[0].weights.shape[0], len(self.explicit)
+        both = np.zeros((count + k, count + k))
+        for f in self.families:
+            gram = f.basis @ f.basis.T
+            for c, row in enumerate(f.rows):
+                w = f.weights[:, c]
+                both[:count, :count] += (w @ gram) @ w.T
+                if k:
+                    cross = w @ (self.explicit[:, row] @ f.basis.T).T
+                    both[:count, count:] += cross
+                    both[count:, :count] += cross.T
+        if k:
+            flat = self.explicit.reshape(k, -1)
+            both[count:, count:] = flat @ flat.T
+        return both[np.ix_(self.index, self.index)]
+
+    def column(self, number: int) -> FloatArray:
+        """(channels, m) the slope by one number."""
+        place, count = int(self.index[number]), self.families[0].weights.shape[0]
+        if place >= count:
+            return np.asarray(self.explicit[place - count])
+        rows = sum(len(f.rows) for f in self.families)
+        out = np.zeros((rows, self.families[0].basis.shape[1]))
+        for f in self.families:
+            out[list(f.rows)] += f.weights[place] @ f.basis
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class Slopes:
+    """Slopes of all records at a point."""
+
+    records: tuple[RecordSlopes, ...]
+
+    def grams(self, residuals: Sequence[FloatArray]) -> list[FloatArray]:
+        """(k, k) of each record: own, group's, shared numbers, residual."""
+        return [one.gram(rows) for one, rows in zip(self.records, residuals, strict=True)]
+
+    @classmethod
+    def of(cls, of: Percussion, at: Numbers, candidates: Sequence[Candidate] = ()) -> Slopes:
+        """At a point; last among the shared numbers those of candidates."""
+        by_pose: dict[int, list[int]] = {}
+        for k, pose in enumerate(of.group_of):
+            by_pose.setdefault(pose, []).append(k)
+        found: dict[int, RecordSlopes] = {}
+        for records in by_pose.values():
+            found |= _Pose(of, at, records).slopes(candidates)
+        return cls(tuple(found[k] for k in range(len(of.group_of))))
+
+
+def _linear(setup: PercussionSetup, model: Model, system: VibratingSystem) -> VibratingSystem:
+    """A system whose nonlinear elements are springs and dampers that act most alike.
+
+    Statistical linearisation over the record's own motion (Roberts and Spanos, Random vibration
+    and statistical linearization (1990), chapter 5).
+    """
+    if not system.elements:
+        return system
+    _, motion = setup._motion(model, setup.samples)
+    x, v, a = motion.position, motion.velocity, motion.acceleration
+    times = setup.samples.times
+    force = np.where(times >= 0.0, setup.struck(model).force(times), 0.0)
+    torque = np.outer(force, system.force) - a @ system.mass - v @ system.damping
+    torque = torque - x @ system.stiffness
+    stiffness, damping = system.stiffness.copy(), system.damping.copy()
+    for row in np.unique(system.rows, axis=0):
+        away = np.column_stack([x @ row, v @ row, np.ones(times.size)])
+        scale = np.maximum(np.abs(away).max(axis=0), 1e-300)
+        found = np.linalg.lstsq(away / scale, torque @ row / (row @ row), rcond=None)[0] / scale
+        stiffness += found[0] * np.outer(row, row)
+        damping += found[1] * np.outer(row, row)
+    rows = np.zeros((0, system.rows.shape[1]))
+    return replace(system, stiffness=stiffness, damping=damping, elements=(), rows=rows)
+
+
+class _Pose:
+    """The records of one pose at a point: what they have in common is found once."""
+
+    def __init__(self, of: Percussion, at: Numbers, records: list[int]) -> None:
+        self.of, self.at, self.records = of, at, records
+        self.base = of.effects_at(at)
+        self.there = {k: of.there(k, at, self.base) for k in records}
+        self.setups = {k: self.there[k][0].until(of.end) for k in records}
+        self.struck = {k: self.setups[k].struck(self.there[k][1]) for k in records}
+        self.exact = {k: self.setups[k]._system(self.there[k][1], self.struck[k].blows) for k in records}
+        self.systems = {k: _linear(self.setups[k], self.there[k][1], self.exact[k]) for k in records}
+        first = records[0]
+        self.model, self.setup, self.system = self.there[first][1], self.setups[first], self.exact[first]
+        self.chains = {g: self.model.sensors(self.setup.conditions).get(g) for g in self.setup.groups}
+        self.drifts = any(e.where == "over-time" for e in self.base)
+
+    def system_of(self, model: Model, k: int) -> VibratingSystem:
+        """Of a model, without its nonlinear elements."""
+        return replace(self.setups[k]._system(model, self.struck[k].blows), elements=(), rows=np.zeros((0, 1)))
+
+    def moved(self, one: Inexact, step: float) -> Model:
+        """The first record's model with a number of blows or sensors moved on."""
+        return self.moved_of(self.records[0], one, step)
+
+    def moved_of(self, k: int, one: Inexact, step: float) -> Model:
+        """A record's model with a number of blows or sensors moved on."""
+        moved = {m.name: (m, size) for m, size in self.of.moved(k, self.at)}
+        size = moved[one.name][1] if one.name in moved else np.zeros(1)
+        moved[one.name] = (one, size + step)
+        more = as_effects([m for m in moved.values() if m[0].where != POSE])
+        return self.of.data.problem.model.with_effects((*self.base, *more))
+
+    # One column each -----------------------------------------------------------------------
+
+    def structural(self, before: Model, after: Model, size: float, effect_drifts: bool = False) -> list[Column] | None:
+        """Of two models whose equations differ; None where they have other coordinates."""
+        out, known = [], None
+        for k in self.records:
+            if known is None or self.drifts or effect_drifts:
+                b, a = self.system_of(before, k), self.system_of(after, k)
+                if a.coordinates != b.coordinates:
+                    return None
+                known = Column("change", change=Change.between(b, a, size))
+            out.append(known)
+        return out
+
+    def inexact(self, one: Inexact) -> list[Column]:
+        """By a number that is never exact, of each record."""
+        if self.of.light:
+            return [_NONE] * len(self.records)
+        if one.where == "structure":
+            ends = [_under(self.model, Nudge([(one, np.array([s]))], "structure")) for s in (-_STEP, _STEP)]
+            found = self.structural(ends[0], ends[1], 2.0 * _STEP)
+            assert found is not None
+            return found
+        if one.where == POSE:
+            index, sigma = one.change
+            moved = self.setup.geometry.pose.copy()
+            moved[index] += _TURN
+            geometry = self.setup.geometry.beside(moved)
+            size, out, known = _TURN / sigma, [], None
+            for k in self.records:
+                if known is None or self.drifts:
+                    near = replace(self.setups[k], geometry=geometry)
+                    after = near._system(self.there[k][1], self.struck[k].blows)
+                    known = Column("change", change=Change.between(self.exact[k], after, size, seen=True))
+                out.append(known)
+            return out
+        if one.where == "sensor":
+            ends = [self.moved(one, s) for s in (-_STEP, _STEP)]
+            return [self.sensor(ends[0], ends[1], 2.0 * _STEP)] * len(self.records)
+        low, high = (0.0, _STEP) if one.one_way else (-_STEP, _STEP)
+        return [
+            self.blows(k, self.moved_of(k, one, low), self.moved_of(k, one, high), high - low)
+            for k in self.records
+        ]
+
+    def sensor(self, before: Model, after: Model, size: float) -> Column:
+        """Of two models whose sensors differ."""
+        conditions = self.setup.conditions
+        both = [{g: m.sensors(conditions).get(g) for g in self.chains} for m in (before, after)]
+        return Column("sensor", chains=(both[0], both[1]), size=size)
+
+    def blows(self, k: int, before: Model, after: Model, size: float) -> Column:
+        """Of two models whose blows differ."""
+        one, other = self.setups[k].struck(before), self.setups[k].struck(after)
+        ours = self.struck[k]
+        if one.alike(other) and one.alike(ours):
+            turned = (other.blows.direction - one.blows.direction) / size
+            return Column("force", direction=turned, louder=(other.peak - one.peak) / ours.peak / size)
+        return Column("strikes", strikes=tuple(_differing(one, other)), size=size)
+
+    def effect(self, now: Effect, ends: Sequence[Effect], size: float) -> list[Column]:
+        """By a parameter of an effect."""
+        pairs = {k: [_swapped(self.there[k][1], now, e) for e in ends] for k in self.records}
+        first = pairs[self.records[0]]
+        if now.where in _STRUCTURAL:
+            found = self.structural(first[0], first[1], size) if not self.drifts else None
+            if found is None and self.drifts:
+                found = []
+                for k, (b, a) in pairs.items():
+                    found.append(Column("change", change=Change.between(self.system_of(b, k), self.system_of(a, k), size)))
+            if found is not None:
+                return found
+        if now.where == "blows":
+            return [self.blows(k, *pairs[k], size) for k in self.records]
+        if now.where == "sensor" and self.plain(first):
+            return [self.sensor(first[0], first[1], size)] * len(self.records)
+        return [Column("models", models=(pairs[k][0], pairs[k][1]), size=size) for k in self.records]
+
+    def plain(self, models: Sequence[Model]) -> bool:
+        """Whether sensors of all models differ from today's in place, axes and gain alone."""
+        for model in models:
+            for g, now in self.chains.items():
+                other = model.sensors(self.setup.conditions).get(g)
+                if replace(other, place=now.place, turn=now.turn, gain=now.gain) != now:
+                    try:
+                        same = (other.mount, other.highpass, other.lowpass, other.delay, other.clock_rate, other.limit, other.hum) == (
+                            now.mount, now.highpass, now.lowpass, now.delay, now.clock_rate, now.limit, now.hum)
+                    except ValueError:
+                        same = False
+                    if not same:
+                        return False
+        return True
+
+    def candidate(self, one: Candidate) -> list[Column]:
+        """By an effect that is not in the model."""
+        pairs = {k: (self.there[k][1], _under(self.there[k][1], one.effect)) for k in self.records}
+        first = pairs[self.records[0]]
+        try:
+            if one.effect.where in _STRUCTURAL and one.share < 0.5:
+                found = self.structural(first[0], first[1], one.share, one.effect.where == "over-time") if not self.drifts and one.effect.where != "over-time" else [
+                    Column("change", change=Change.between(self.system_of(b, k), self.system_of(a, k), one.share)) for k, (b, a) in pairs.items()]
+                if found is not None:
+                    return found
+            if one.effect.where == "blows" and one.share < 0.5:
+                return [self.blows(k, *pairs[k], one.share) for k in self.records]
+            if one.effect.where == "sensor" and self.plain(first):
+                return [self.sensor(first[0], first[1], one.share)] * len(self.records)
+        except (InputError, np.linalg.LinAlgError):
+            return [_NONE] * len(self.records)
+        return [Column("models", models=pairs[k], size=one.share) for k in self.records]
+
+    # All together ----------------------------------------------------------------------------
+
+    def slopes(self, candidates: Sequence[Candidate]) -> dict[int, RecordSlopes]:
+        """Of every record of the pose."""
+        of, at, data = self.of, self.at, self.of.data
+        tail: list[list[Column]] = []  # of each number: of each record
+        tail += [self.inexact(one) for one in data.groups[of.group_of[self.records[0]]]]
+        place = 0
+        for cause, now in zip((*of._base(), *of.causes), self.base, strict=True):
+            u = at.shared[place : place + len(cause.numbers)]
+            for j, n in enumerate(cause.numbers):
+                step = max(1e-3 * n.std, 1e-2 * u[j]) if n.kind == "inverse" else 1e-3 * n.std
+                low, high = max(u[j] - step, n.low), min(u[j] + step, n.high)
+                ends = [cause.at([*u[:j], value, *u[j + 1 :]]) for value in (low, high)]
+                tail.append(self.effect(now, ends, high - low))
+            place += len(cause.numbers)
+        tail += [self.inexact(one) for one in of.inexact]
+        tail += [self.candidate(one) for one in candidates]
+        found = {}
+        for i, k in enumerate(self.records):
+            head: list[Column] = []
+            blows: list[tuple[float, bool, int]] = []
+            for one, blow in of.own(k):
+                if not isinstance(one, Inexact):
+                    if one.later:
+                        head.append(Column("strikes", size=1.0))
+                        blows.append((1.0, True, blow))
+                    else:
+                        head.append(Column("line", line=(one.cause.effect, blow)))
+                elif of.light:
+                    head.append(_NONE)
+                elif blow >= 0:
+                    head.append(Column("strikes", size=1.0))
+                    sigma = float(getattr(of.data.problem.campaign.tolerance, one.key))
+                    blows.append((sigma, one.key == "blow_time", blow))
+                else:
+                    ends = [self.moved_of(k, one, s) for s in (-_STEP, _STEP)]
+                    head.append(self.blows(k, ends[0], ends[1], 2.0 * _STEP))
+            columns = head + [c[i] for c in tail]
+            found[k] = _Record(self, k).slopes(columns, blows)
+        return found
+
+
+class _Record:
+    """One record at a point."""
+
+    def __init__(self, pose: _Pose, k: int) -> None:
+        self.pose, self.k, self.of = pose, k, pose.of
+        self.record, self.model = pose.there[k]
+        self.setup, self.struck, self.system = pose.setups[k], pose.struck[k], pose.systems[k]
+        self.own: MeasuredRecord = pose.of.data.records[k]
+
+    def slopes(
+        self, columns: Sequence[Column], blows: Sequence[tuple[float, bool, int]]
+    ) -> RecordSlopes:
+        """Of all numbers.
+
+        Args:
+            columns: of each number.
+            blows: (size, whether of its time, blow) of those columns of strikes that have none.
+        """
+        setup, own, channels = self.setup, self.own, self.own.channels
+        count = setup.samples.count
+        weighed = [c for c in columns if c.kind in ("change", "force", "sensor", "none")]
+        listed = [c for c in columns if c.kind in ("strikes", "models", "line")]
+        places, a, b = [], 0, len(weighed)
+        for c in columns:
+            if c.kind in ("strikes", "models", "line"):
+                places.append(b)
+                b += 1
+            else:
+                places.append(a)
+                a += 1
+        explicit = np.zeros((len(listed), len(channels), count))
+        families: list[Family] = []
+        modes = _Modes.of(self.system)
+        if modes is None:
+            raise InputError("no independent modes of vibration")
+        members: dict[str, list[int]] = {}
+        for i, c in enumerate(channels):
+            members.setdefault(c.group, []).append(i)
+        edges = self.of.edges[self.k]
+        series_of: dict[object, tuple] = {}
+        for group, rows in members.items():
+            first = channels[rows[0]]
+            chain = self.pose.chains[group] if not self.pose.drifts else self.model.sensors(setup.conditions).get(group)
+            taken = setup._taken(first, chain)
+            chain, key = taken.chain, (taken.samples, taken.at_jumps)
+            if key not in series_of:
+                plan = setup._plan(self.struck, self.system, *key)
+                y, slope, pushed = modes.series(plan, taken.samples.count)
+                whole = np.concatenate([y.real, y.imag, slope.real, slope.imag, pushed[None]])
+                series_of[key] = whole, self._weights(modes, weighed), _Strikes.of(modes, self.struck, *key)
+            whole, (position, velocity, acceleration), strikes = series_of[key]
+            reader = _slopes_of(first, chain, self.system)
+            silent = not any(part.any() for part in reader)
+            if first.kind.axes:
+                pick = ["xyz".index(channels[i].axis or "x") for i in rows]
+            elif first.kind.of == "joint":
+                pick = [setup.geometry.robot.flexible_names.index(channels[i].subject or "") for i in rows]
+            else:
+                pick = [0] * len(rows)
+            axes = bool(first.kind.axes)
+
+            def through(link: SensorChain, values: FloatArray, axes: bool = axes, pick: list[int] = pick) -> FloatArray:
+                """Of what is read (..., rows, S): behind axes and gain."""
+                turned = link.turn @ values if axes else values
+                return np.asarray(link.gain * turned[..., pick, :])
+
+            def read(by: tuple[FloatArray, FloatArray, FloatArray], which: int, position=position, velocity=velocity, acceleration=acceleration) -> FloatArray:
+                return by[0] @ position[which] + by[1] @ velocity[which] + by[2] @ acceleration[which]
+
+            weights = np.zeros((len(weighed), len(rows), len(whole)))
+            if not silent:
+                base = read(reader, -1)
+                every = np.tensordot(reader[0], position, (1, 1)) + np.tensordot(reader[1], velocity, (1, 1)) + np.tensordot(reader[2], acceleration, (1, 1))
+                every = np.moveaxis(every, 1, 0)  # (numbers + 1, rows, S)
+                weights[:] = through(chain, every[:-1])
+                for w, c in enumerate(weighed):
+                    if c.kind == "change" and c.change is not None and c.change.moved is not None:
+                        seen, size = c.change.moved
+                        weights[w] += through(chain, (read(_slopes_of(first, chain, seen), -1) - base) / size)
+                    elif c.kind == "sensor" and c.chains is not None:
+                        ends = [c.chains[0][group], c.chains[1][group]]
+                        if ends[0] is ends[1] or all(np.array_equal(ends[0].turn, e.turn) and ends[0].gain == e.gain and np.array_equal(ends[0].place, e.place) for e in ends):
+                            continue
+                        both = []
+                        for link in ends:
+                            by = reader if np.array_equal(link.place, chain.place) else _slopes_of(first, link, self.system)
+                            both.append(through(link, base if by is reader else read(by, -1)))
+                        weights[w] = (both[1] - both[0]) / c.size
+            series = whole
+            if chain.filters:
+                series = apply_filters(chain, series, taken.samples.step, taken.factor)[..., taken.lead :]
+            free = setup.steady or first.kind.free_offset
+            unknown = edges[group][:count] if edges is not None and first.kind.jumps else None
+            noise = [own.noise[channels[i].name].model for i in rows]
+            dead: list[BoolArray | None] = [unknown] * len(rows)
+            if np.isfinite(chain.limit):
+                now = setup._group(self.model, chain, [channels[i] for i in rows])
+                for c, i in enumerate(rows):
+                    clipped = np.abs(now[channels[i].name]) >= chain.limit
+                    dead[c] = clipped if unknown is None else clipped | unknown
+            alike: dict[object, list[int]] = {}
+            for c in range(len(rows)):
+                name = noise[c].reflection.tobytes(), None if dead[c] is unknown else c
+                alike.setdefault(name, []).append(c)
+            for own_rows in alike.values():
+                lead = own_rows[0]
+                basis = _whitened(series, noise[lead], dead[lead], free, unknown)
+                scale = np.sqrt([noise[lead].variance / noise[c].variance for c in own_rows])
+                w = weights[:, own_rows] * scale[:, None]
+                families.append(Family(tuple(rows[c] for c in own_rows), basis, w))
+            if silent:
+                continue
+            on = strikes.weights
+            block = reader[0] @ on[0] + reader[1] @ on[1] + reader[2] @ on[2]
+            block = through(replace(chain), block)  # (rows, 2m + 1)
+            mine = iter(blows)
+            for e, c in enumerate(listed):
+                if c.kind != "strikes":
+                    continue
+                if c.strikes or c.size != 1.0:
+                    values = block @ strikes.series(c.strikes) / c.size
+                else:
+                    sigma, later, blow = next(mine)
+                    values = sigma * (block @ strikes.of_blow(blow, later))
+                if chain.filters:
+                    values = apply_filters(chain, values, taken.samples.step, taken.factor)[..., taken.lead :]
+                for c_, i in enumerate(rows):
+                    explicit[e, i] = _whitened(values[c_][None], noise[c_], dead[c_], free, unknown)[0]
+        for e, c in enumerate(listed):
+            if c.line is not None:
+                effect, place = c.line
+                phase = 2.0 * np.pi * effect.values["frequency"] * setup.samples.times
+                wave = np.sin(phase) if place else np.cos(phase)
+                for i in members.get(effect.target, []):
+                    model = own.noise[channels[i].name].model
+                    free = setup.steady or channels[i].kind.free_offset
+                    unknown = edges[effect.target][:count] if edges is not None and channels[i].kind.jumps else None
+                    explicit[e, i] = _whitened(wave[None], model, unknown, free, unknown)[0]
+        now_left: FloatArray | None = None
+        for e, c in enumerate(listed):
+            if c.kind != "models" or c.models is None:
+                continue
+            before, after = c.models
+            try:
+                if before is self.model:
+                    if now_left is None:
+                        now_left = self.of.residual(self.k, self.record, before)
+                    start = now_left
+                else:
+                    start = self.of.residual(self.k, self.record, before)
+                explicit[e] = (start - self.of.residual(self.k, self.record, after)) / c.size
+            except InputError:
+                explicit[e] = 0.0
+        return RecordSlopes(tuple(families), explicit, np.array(places, dtype=np.intp))
+
+    def _weights(self, modes: _Modes, columns: Sequence[Column]) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(numbers + 1, n, S) weights of position, velocity, acceleration on the series; last the motion itself."""
+        system, direction = self.system, self.struck.blows.direction
+        n, count = len(system.coordinates), len(columns)
+        mass, held, force = np.zeros((count + 1, n, n)), np.zeros((count + 1, n, 2 * n)), np.zeros((count + 1, n))
+        louder = np.zeros(count + 1)
+        louder[-1] = 1.0
+        for i, c in enumerate(columns):
+            if c.change is not None:
+                mass[i] = c.change.mass
+                held[i, :, :n], held[i, :, n:] = c.change.stiffness, c.change.damping
+                force[i] = c.change.jacobian.T @ direction
+            elif c.kind == "force" and c.direction is not None:
+                force[i] = system.force_jacobian.T @ c.direction
+                louder[i] = c.louder
+        poles, back = modes.poles, modes.back
+        among = -back[:, n:] @ (modes.inverse @ (held - mass @ modes.held)) @ modes.modes
+        push = (force - mass @ (modes.inverse @ system.force)) @ modes.inverse.T
+        apart = poles[None, :] - poles[:, None]
+        alike = np.abs(apart) < _ALIKE * np.abs(poles).max()
+        quotient = np.where(alike, 0.0, among * modes.driven / np.where(alike, 1.0, apart))
+        weights = quotient.astype(complex)
+        index = np.arange(2 * n)
+        weights[:, index, index] += push @ back[:, n:].T - quotient.sum(axis=2) + louder[:, None] * modes.driven
+        on, slopes = modes.modes @ weights, modes.modes @ np.where(alike, among * modes.driven, 0.0)
+
+        def rows(first: ComplexArray, second: ComplexArray, straight: FloatArray) -> FloatArray:
+            return np.concatenate([modes.real(first), modes.real(second), straight], axis=-1)
+
+        none = np.zeros((count + 1, n, 1))
+        moving, turning = on[:, n:], slopes[:, n:]
+        return (
+            rows(on[:, :n], slopes[:, :n], none),
+            rows(moving, turning, none),
+            rows(moving * poles + turning, turning * poles, moving.sum(axis=2).real[..., None]),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Strikes:
+    """What single blows do, as series that all channels share.
+
+    Attributes:
+        modes: of the system.
+        struck: the record's blows.
+        poles: (m,) of the modes that are kept.
+        blows: (blows, m, count) the answer to each of the record's blows, and (blows, count) its
+            force.
+        weights: of position, velocity and acceleration on the real and imaginary parts and the
+            force, (n, 2m + 1) each.
+        key: samples, and how jumps are taken.
+    """
+
+    system: VibratingSystem
+    poles: ComplexArray
+    blows: ComplexArray
+    forces: FloatArray
+    weights: tuple[FloatArray, FloatArray, FloatArray]
+    key: tuple
+
+    @classmethod
+    def of(cls, modes: _Modes, struck: Struck, samples, at_jumps) -> _Strikes:
+        """Of a record's blows."""
+        poles, blows = modes.poles[modes.kept], struck.blows
+        hits = np.unique(blows.hit) if blows.period is None else np.zeros(0)
+        answers = np.zeros((hits.size, poles.size, samples.count), complex)
+        forces = np.zeros((hits.size, samples.count))
+        for height, shape in blows.parts if hits.size else ():
+            pieces = np.column_stack([shape.start, shape.constant, shape.slope])
+            waves = np.asarray(shape.amplitude, complex), np.asarray(shape.angular_frequency, float)
+            last = shape.end if np.isfinite(shape.end) else float(shape.start[-1])
+            for k in range(blows.start.size):
+                h = int(np.searchsorted(hits, blows.hit[k]))
+                _answer(poles, pieces, *waves, last, float(blows.start[k]), float(height[k]),
+                        samples.start, samples.step, answers[h], forces[h])
+        n = len(modes.inverse)
+        on = modes.modes * modes.driven
+        moving = on[n:]
+        none = np.zeros((n, 1))
+        at_once = moving.sum(axis=1).real[:, None]
+        weights = (
+            np.hstack([modes.real(on[:n]), none]),
+            np.hstack([modes.real(moving), none]),
+            np.hstack([modes.real(moving * modes.poles), at_once]),
+        )
+        return cls(modes, poles, answers, forces, weights, (samples, at_jumps))
+
+    def of_blow(self, blow: int, later: bool) -> FloatArray:
+        """(2m + 1, count) by a blow's relative height, or by the time when it comes."""
+        y, force = self.blows[blow], self.forces[blow]
+        if later:
+            y = -(self.poles[:, None] * y + force)
+            force = np.zeros_like(force)
+        return np.vstack([y.real, y.imag, force])
+
+    def series(self, strikes: Sequence[Strike]) -> FloatArray:
+        """(2m + 1, count) of blows that come and go."""
+        samples, _ = self.key
+        y = np.zeros((self.poles.size, samples.count), complex)
+        force = np.zeros(samples.count)
+        for s in strikes:
+            shape = s.shape
+            pieces = np.column_stack([shape.start, shape.constant, shape.slope])
+            last = shape.end if np.isfinite(shape.end) else float(shape.start[-1])
+            _answer(self.poles, pieces, np.asarray(shape.amplitude, complex),
+                    np.asarray(shape.angular_frequency, float), last, s.start, s.height,
+                    samples.start, samples.step, y, force)
+        return np.vstack([y.real, y.imag, force])
+
+
+@njit(cache=True, nogil=True)
+def _within(lam, constant, slope, amplitude, omega, u):
+    """The answer of z' = lam z + F from rest, u s into one piece of a blow."""
+    e = np.exp(lam * u)
+    out = 0.0j
+    if abs(lam * u) < 1e-4:
+        x = lam * u
+        out += constant * u * (1.0 + x / 2.0 + x * x / 6.0)
+        out += slope * u * u * (0.5 + x / 6.0 + x * x / 24.0)
+    else:
+        out += constant * (e - 1.0) / lam
+        out += slope * (e - 1.0 - lam * u) / (lam * lam)
+    if amplitude != 0.0:
+        for c, mu in ((amplitude, 1j * omega), (np.conj(amplitude), -1j * omega)):
+            d = lam - mu
+            if abs(d * u) < 1e-6:
+                out += 0.5 * c * np.exp(mu * u) * u
+            else:
+                out += 0.5 * c * (e - np.exp(mu * u)) / d
+    return out
+
+
+@njit(cache=True, nogil=True)
+def _answer(poles, pieces, amplitude, omega, end, begin, height, start, step, out, force):
+    """Add the answer of each pole to one blow, and the blow's force, at the samples.
+
+    Args:
+        poles: (m,) 1/s.
+        pieces: (p, 3) start (s), constant (N), slope (N/s).
+        amplitude, omega: (p,) of a wave in each.
+        end: s, of the last piece.
+        begin, height: when the blow comes, and by what it is multiplied.
+        start, step: s, of the samples.
+        out: (m, count), added to.
+        force: (count,), added to.
+    """
+    count, p = force.size, pieces.shape[0]
+    first = max(int(np.ceil((max(begin, 0.0) - start) / step - 1e-9)), 0)
+    for i in range(poles.size):
+        lam = poles[i]
+        at = np.zeros(p + 1, dtype=np.complex128)
+        for j in range(p):
+            to = pieces[j + 1, 0] if j + 1 < p else end
+            span = to - pieces[j, 0]
+            at[j + 1] = at[j] * np.exp(lam * span) + _within(
+                lam, pieces[j, 1], pieces[j, 2], amplitude[j], omega[j], span
+            )
+        grown, z, tail = np.exp(lam * step), 0.0j, False
+        for k in range(first, count):
+            u = start + step * k - begin
+            if u >= end:
+                z = z * grown if tail else at[p] * np.exp(lam * (u - end))
+                tail = True
+            else:
+                j = p - 1
+                while j > 0 and pieces[j, 0] > u + 1e-12:
+                    j -= 1
+                v = max(u - pieces[j, 0], 0.0)
+                z = at[j] * np.exp(lam * v) + _within(
+                    lam, pieces[j, 1], pieces[j, 2], amplitude[j], omega[j], v
+                )
+            out[i, k] += height * z
+    for k in range(first, count):
+        u = start + step * k - begin
+        if u >= end:
+            break
+        j = p - 1
+        while j > 0 and pieces[j, 0] > u + 1e-12:
+            j -= 1
+        v = max(u - pieces[j, 0], 0.0)
+        wave = (amplitude[j] * np.exp(1j * omega[j] * v)).real
+        force[k] += height * (pieces[j, 1] + pieces[j, 2] * v + wave)
+
+
+def _under(model: Model, more: Effect) -> Model:
+    return replace(model, effects=(*model.effects, more))
+
+
+def _swapped(model: Model, old: Effect, new: Effect) -> Model:
+    return replace(model, effects=tuple(new if e is old else e for e in model.effects))
+
+
+def _whitened(
+    series: FloatArray, noise: AutoRegression, dead: BoolArray | None, free: bool,
+    unknown: BoolArray | None,
+) -> FloatArray:
+    """(S, m) in units of the noise; 0 where nothing is known."""
+    if free:
+        series = series - series.mean(axis=1, keepdims=True)
+    if dead is not None:
+        series = np.where(dead, 0.0, series)
+    out = np.empty(series.shape)
+    _whiten_all(np.ascontiguousarray(series), *noise.filters, out)
+    if unknown is not None:
+        out[:, unknown] = 0.0
+    return out
+
+
+@njit(cache=True, nogil=True)
+def _whiten_all(series, predictors, deviation, out):
+    """`whiten` row by row."""
+    for i in range(series.shape[0]):
+        whiten(series[i], predictors, deviation, out[i])
