@@ -71,7 +71,7 @@ def reduce(
     for group, there in enumerate(at.groups):
         m = there.size
         inner = np.zeros((m + n + 1, m + n + 1))
-        for record in np.flatnonzero(np.asarray(group_of) == group):
+        for record in np.flatnonzero(np.asarray(group_of) == group).tolist():
             gram, k = weights[group] * grams[record], at.records[record].size
             if k:
                 own = gram[:k, :k] + np.eye(k)
@@ -84,7 +84,7 @@ def reduce(
             else:
                 solved = np.zeros((0, m + n + 1))
                 inner += gram
-            records.append((int(record), group, solved))
+            records.append((record, group, solved))
         if m:
             own = inner[:m, :m] + np.eye(m)
             cross = inner[:m, m:].copy()
@@ -106,7 +106,8 @@ def bounded(reduced: Reduced, low: FloatArray, high: FloatArray) -> FloatArray:
 
     Args:
         reduced: the system.
-        low, high: (n,) bounds of the step.
+        low: (n,) least step.
+        high: (n,) largest step.
     """
     a, b = reduced.precision, reduced.pull
     step = np.linalg.solve(a, b)

@@ -42,16 +42,38 @@ class Prior:
 class Likelihood(Protocol):
     """A campaign's records under one hypothesis, up to a time."""
 
-    prior: Prior
-    group_of: Sequence[int]
-    samples: Sequence[int]
-    signal: Sequence[float]
+    @property
+    def prior(self) -> Prior:
+        """Of all numbers."""
+
+    @property
+    def group_of(self) -> Sequence[int]:
+        """The group of each record."""
+
+    @property
+    def samples(self) -> Sequence[int]:
+        """Of each record, all its channels together."""
+
+    @property
+    def signal(self) -> Sequence[float]:
+        """Sum of squares of what was measured in each record, in units of the noise."""
 
     def residuals(self, at: Numbers) -> list[FloatArray]:
-        """Whitened residuals of each record."""
+        """Whitened residuals of each record.
+
+        Args:
+            at: the numbers.
+
+        Raises:
+            InputError: no model there.
+        """
 
     def linearised(self, at: Numbers) -> Linear:
-        """The slopes there."""
+        """The slopes there.
+
+        Args:
+            at: the numbers.
+        """
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +100,8 @@ class Fit:
         reduced: the system in what is shared.
         covariance: (n, n) of the shared numbers, in units of their prior.
         renewals: how often slopes were taken.
+        penalty: nats, the log of how many ways there are to choose what was tried, not fitted.
+        grams: products of slopes and residual, in units of the prior.
     """
 
     likelihood: Any
@@ -89,6 +113,7 @@ class Fit:
     reduced: Reduced
     covariance: FloatArray
     renewals: int
+    penalty: float = 0.0
     grams: list[FloatArray] = field(repr=False, default_factory=list)
 
     @property
@@ -120,8 +145,10 @@ def objective(likelihood: Likelihood, at: Numbers, squares: FloatArray) -> Objec
 def grouped(likelihood: Likelihood, squares: FloatArray) -> list[Any]:
     """What is left of each group."""
     of = np.asarray(likelihood.group_of)
-    sums = [np.bincount(of, np.asarray(v, float)) for v in
-            (squares, likelihood.samples, likelihood.signal, np.ones(of.size))]
+    sums = [
+        np.bincount(of, np.asarray(v, float))
+        for v in (squares, likelihood.samples, likelihood.signal, np.ones(of.size))
+    ]
     return [left(c, int(n), s, int(r)) for c, n, s, r in zip(*sums, strict=True)]
 
 
@@ -158,7 +185,10 @@ def promised(
 
 
 def solve(
-    likelihood: Likelihood, grams: Sequence[FloatArray], at: Numbers, weights: FloatArray,
+    likelihood: Likelihood,
+    grams: Sequence[FloatArray],
+    at: Numbers,
+    weights: FloatArray,
     rounds: int = 3,
 ) -> tuple[Numbers, Reduced, float]:
     """The step of least cost by the slopes, groups' weights renewed on the way.
@@ -231,8 +261,9 @@ def estimate(
             for _ in range(6):
                 try:
                     there = at + (step * prior.std).scaled(size)
-                    there = Numbers(np.clip(there.shared, prior.low, prior.high), there.groups,
-                                    there.records)
+                    there = Numbers(
+                        np.clip(there.shared, prior.low, prior.high), there.groups, there.records
+                    )
                     left_there = likelihood.residuals(there)
                     then = objective(likelihood, there, squares_of(left_there))
                     if then.value < now.value - 1e-9:
@@ -260,7 +291,11 @@ def estimate(
 
 
 def settled(
-    likelihood: Likelihood, at: Numbers, residuals: list[FloatArray], now: Objective, linear: Any,
+    likelihood: Likelihood,
+    at: Numbers,
+    residuals: list[FloatArray],
+    now: Objective,
+    linear: Any,
     used: int,
 ) -> Fit:
     """A fit at its numbers: evidence and covariance."""
@@ -271,6 +306,14 @@ def settled(
     log_det = system.log_determinant + 2.0 * float(np.log(np.diag(factor)).sum())
     inverse = np.linalg.inv(factor)
     return Fit(
-        likelihood, at, now, -now.value - 0.5 * log_det, residuals, linear, system,
-        inverse.T @ inverse, used, grams,
+        likelihood,
+        at,
+        now,
+        -now.value - 0.5 * log_det,
+        residuals,
+        linear,
+        system,
+        inverse.T @ inverse,
+        used,
+        grams=grams,
     )

@@ -15,8 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from picchio.core.arrays import FloatArray
-
 SIZE = 0.005
 """Of the signal: one standard deviation of what a good model of a robot leaves."""
 FREEDOM = 30

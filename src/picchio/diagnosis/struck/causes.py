@@ -110,7 +110,10 @@ class Cause:
 
     def partly(self, share: float) -> Effect:
         """The effect with so much of its amount."""
-        u = [x * share if n.amount else x for n, x in zip(self.numbers, self.coordinates(self.effect), strict=True)]
+        u = [
+            x * share if n.amount else x
+            for n, x in zip(self.numbers, self.coordinates(self.effect), strict=True)
+        ]
         return self.at(u)
 
 
@@ -140,12 +143,16 @@ def _number(
     p: Parameter, effect: Effect, trials: Sequence[Mapping[str, float]], tolerated: float
 ) -> EffectNumber:
     value = effect.values[p.name]
-    tried = [abs(t[p.name]) for t in trials if p.name in t and math.isfinite(t[p.name])] or [abs(value)]
+    tried = [abs(t[p.name]) for t in trials if p.name in t and math.isfinite(t[p.name])] or [
+        abs(value)
+    ]
     if p.by_inverse:
         k0 = min(tried)
         return EffectNumber(p.name, "inverse", 0.0, k0, AMOUNT, STIFF, 1e3, True)
     stiffness = effect.values.get("stiffness", 0.0)
-    if p.name == "damping" and any(q.name == "stiffness" and q.by_inverse for q in effect.parameters):
+    if p.name == "damping" and any(
+        q.name == "stiffness" and q.by_inverse for q in effect.parameters
+    ):
         return EffectNumber(p.name, "relaxation", value / stiffness, 1.0, SHAPE, -12.0, 12.0, False)
     if p.logarithmic:
         amount = 0.0 < p.neutral < math.inf and not p.shape and p.neutral == 1.0
@@ -162,12 +169,20 @@ def _number(
     amount = not p.shape and about == 0.0
     std = p.spread / size if p.spread else (math.hypot(AMOUNT, tolerated / size) if amount else 1.0)
     return EffectNumber(
-        p.name, "linear", about, size, std,
-        max((p.lower - about) / size, -1e9), min((p.upper - about) / size, 1e9), amount,
+        p.name,
+        "linear",
+        about,
+        size,
+        std,
+        max((p.lower - about) / size, -1e9),
+        min((p.upper - about) / size, 1e9),
+        amount,
     )
 
 
-def candidate_starts(kind: type[Effect], target: str, scales: Scales, tolerance: Tolerance) -> list[Cause]:
+def candidate_starts(
+    kind: type[Effect], target: str, scales: Scales, tolerance: Tolerance
+) -> list[Cause]:
     """A candidate at every size at which it is tried."""
     trials = kind(target).trials(scales)
     out = []

@@ -1,10 +1,11 @@
-"""Percussion records under one hypothesis: residuals by the full model, slopes by the linear one."""
+"""Percussion records under one hypothesis: residuals by the full model, slopes by a linear one."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,6 +24,9 @@ from picchio.diagnosis.percussion.tolerance.nudges import Inexact, inexact, nudg
 from picchio.diagnosis.struck.causes import Cause, EffectNumber, cause_of
 from picchio.model.effects.effect import Effect
 from picchio.model.model import Model
+
+if TYPE_CHECKING:
+    from picchio.diagnosis.struck.slopes import Slopes
 
 _ONCE_A_POSE = ("pose_repeat", "damping_by_mode")
 
@@ -56,7 +60,11 @@ class Data:
             if sigma is None:
                 sigma = float(getattr(tolerance, effect.tolerance))
             cause = cause_of(effect, [], tolerance)
-            base.append(replace(cause, numbers=tuple(replace(n, std=max(sigma, 1e-6)) for n in cause.numbers)))
+            base.append(
+                replace(
+                    cause, numbers=tuple(replace(n, std=max(sigma, 1e-6)) for n in cause.numbers)
+                )
+            )
         lists = [inexact(problem, r, tolerance, measured=False) for r in problem.records]
         shared: dict[str, Inexact] = {}
         groups: dict[int, tuple[Inexact, ...]] = {}
@@ -77,8 +85,13 @@ class Data:
                 else:
                     mine.append((one, -1))
             own.append(tuple(mine))
-        return cls(problem, tuple(base), tuple(shared.values()),
-                   tuple(groups[p] for p in sorted(groups)), tuple(own))
+        return cls(
+            problem,
+            tuple(base),
+            tuple(shared.values()),
+            tuple(groups[p] for p in sorted(groups)),
+            tuple(own),
+        )
 
     chosen: tuple[int, ...] | None = None
 
@@ -132,7 +145,11 @@ class Percussion:
 
     def __post_init__(self) -> None:
         if not self.edges:
-            object.__setattr__(self, "edges", self._edges([c.effect for c in self._base()] + [c.effect for c in self.causes]))
+            object.__setattr__(
+                self,
+                "edges",
+                self._edges([c.effect for c in self._base()] + [c.effect for c in self.causes]),
+            )
 
     def _base(self) -> list[Cause]:
         return [c for c in self.data.base if c.label not in self._labels]
@@ -171,7 +188,9 @@ class Percussion:
     @cached_property
     def names(self) -> list[str]:
         """Of the shared numbers."""
-        return [f"{c.label}.{n.parameter}" for c, n in self.effect_numbers] + [o.name for o in self.inexact]
+        return [f"{c.label}.{n.parameter}" for c, n in self.effect_numbers] + [
+            o.name for o in self.inexact
+        ]
 
     @cached_property
     def prior(self) -> Prior:
@@ -181,7 +200,10 @@ class Percussion:
         tiny = 1e-6 if self.light else 1.0
         std = np.array([n.std for n in numbers] + [tiny] * k)
         mean = np.array([n.mean for n in numbers] + [0.0] * k)
-        low = np.array([n.low for n in numbers] + [0.0 if o.one_way and not o.each_blow else -np.inf for o in self.inexact])
+        low = np.array(
+            [n.low for n in numbers]
+            + [0.0 if o.one_way and not o.each_blow else -np.inf for o in self.inexact]
+        )
         high = np.array([n.high for n in numbers] + [np.inf] * k)
         groups = tuple(np.full(len(g), tiny) for g in self.data.groups)
         records = tuple(
@@ -189,7 +211,9 @@ class Percussion:
             for k in range(len(self.data.records))
         )
         zero = lambda parts: tuple(np.zeros(p.size) for p in parts)  # noqa: E731
-        return Prior(Numbers(mean, zero(groups), zero(records)), Numbers(std, groups, records), low, high)
+        return Prior(
+            Numbers(mean, zero(groups), zero(records)), Numbers(std, groups, records), low, high
+        )
 
     @property
     def group_of(self) -> list[int]:
@@ -213,8 +237,8 @@ class Percussion:
             out.append(total)
         return out
 
-    def start(self, at: Numbers | None = None, like: Percussion | None = None, **causes: Effect) -> Numbers:
-        """Numbers to begin at: those of another hypothesis where they are the same, causes as tried."""
+    def start(self, at: Numbers | None = None, like: Percussion | None = None) -> Numbers:
+        """Numbers to begin at: another hypothesis' where they are the same, causes as tried."""
         known = {}
         if at is not None and like is not None:
             known = dict(zip(like.names, at.shared, strict=True))
@@ -229,9 +253,18 @@ class Percussion:
             return Numbers(shared, zero.groups, zero.records)
         own = []
         for k in range(len(self.data.records)):
-            had = {(o.name if isinstance(o, Inexact) else o.cause.label, i): x
-                   for (o, i), x in zip(like.own(k), at.records[k], strict=True)}
-            own.append(np.array([had.get((o.name if isinstance(o, Inexact) else o.cause.label, i), 0.0) for o, i in self.own(k)]))
+            had = {
+                (o.name if isinstance(o, Inexact) else o.cause.label, i): x
+                for (o, i), x in zip(like.own(k), at.records[k], strict=True)
+            }
+            own.append(
+                np.array(
+                    [
+                        had.get((o.name if isinstance(o, Inexact) else o.cause.label, i), 0.0)
+                        for o, i in self.own(k)
+                    ]
+                )
+            )
         return Numbers(shared, at.groups, tuple(own))
 
     # The model at a point ----------------------------------------------------------------------
@@ -240,7 +273,7 @@ class Percussion:
         out, k = [], 0
         for c in (*self._base(), *self.causes):
             m = len(c.numbers)
-            effect = c.at(at.shared[k : k + m])
+            effect = c.at(at.shared[k : k + m].tolist())
             if effect.latent is not None and not effect.latent.whole:
                 effect = effect.with_hidden(self._hidden(c, at))
             elif c.effect.hidden:
@@ -255,8 +288,11 @@ class Percussion:
         latent = cause.effect.latent
         assert latent is not None
         for k, record in enumerate(self.data.records):
-            mine = [x for (o, _), x in zip(self.own(k), at.records[k], strict=True)
-                    if isinstance(o, Drawn) and o.cause.label == cause.label]
+            mine = [
+                x
+                for (o, _), x in zip(self.own(k), at.records[k], strict=True)
+                if isinstance(o, Drawn) and o.cause.label == cause.label
+            ]
             found[record.name] = (*([0.0] * latent.first), *mine)
         return found
 
@@ -282,7 +318,9 @@ class Percussion:
         out += blows.values()
         return [(o, s) for o, s in out if s.any()]
 
-    def there(self, record: int, at: Numbers, effects: Sequence[Effect]) -> tuple[MeasuredRecord, Model]:
+    def there(
+        self, record: int, at: Numbers, effects: Sequence[Effect]
+    ) -> tuple[MeasuredRecord, Model]:
         """A record with its pose moved, and the model with everything in it."""
         own = self.data.records[record]
         moved, more = nudged(own, self.moved(record, at))
@@ -328,7 +366,7 @@ class Percussion:
         """The same with the samples left out that are near edges there."""
         return replace(self, edges=self._edges(self.effects_at(at)))
 
-    def linearised(self, at: Numbers):
+    def linearised(self, at: Numbers) -> Slopes:
         """The slopes there."""
         from picchio.diagnosis.struck.slopes import Slopes
 

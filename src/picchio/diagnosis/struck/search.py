@@ -1,11 +1,18 @@
-"""One search: sets of causes with their evidence, all in one table."""
+"""One search: sets of causes are fitted, and all stand in one table with their evidence.
+
+Near the truth slopes promise what each candidate gains; far from it, where what is never exact is
+strained, every candidate is tried by itself on the first tenth of a second, with springs, damping
+and force beside it, and the best are fitted on growing windows. None of that decides: it only says
+what to fit next.
+"""
 
 from __future__ import annotations
 
+import logging
 import math
-import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -19,383 +26,264 @@ from picchio.diagnosis.evidence.estimate import (
     squares_of,
     standardised,
 )
-from picchio.diagnosis.evidence.numbers import Numbers
+from picchio.diagnosis.evidence.table import Table, labels_of
+from picchio.diagnosis.evidence.verdict import LEFT, Judged, judge
 from picchio.diagnosis.percussion.search.candidates import all_candidates
-from picchio.diagnosis.struck.causes import Cause, candidate_starts, cause_of
+from picchio.diagnosis.struck.causes import Cause, candidate_starts
+from picchio.diagnosis.struck.drawn import drawn_candidates, missing_blows
 from picchio.diagnosis.struck.likelihood import Data, Percussion
-from picchio.diagnosis.struck.slopes import Candidate, Slopes
+from picchio.diagnosis.struck.screening import screen, times
+from picchio.model.effects.scales import Scales
 
-CLAIM = 3.0
-"""nats: posterior odds for a claim, 20 to 1."""
-LEFT = 0.01
-"""Of the signal: what an honest model may leave."""
 WINDOWS = (0.1, 0.3, None)
-SHARE = 0.02
+"""s: numbers that are far off turn phases by cycles, and are sought on growing windows."""
 FAILED = (InputError, np.linalg.LinAlgError, FloatingPointError)
-
-
-def clock():
-    return time.process_time()
+"""What may happen where there is no model; anything else is a fault of the program."""
+# Effort, not verdicts: how many are looked at further.
+_NEAR, _LIGHT, _RACE = 5, 16, 6
+_SIZES = (0.5, 1.0, 2.0, 4.0)
+_log = logging.getLogger("picchio.diagnosis")
 
 
 @dataclass(eq=False)
 class Search:
+    """A search for what explains a campaign's percussion records.
+
+    Attributes:
+        data: the records.
+        scales: of what size effects are tried.
+        without: names of effects that are not considered.
+        most: causes at once.
+    """
+
     data: Data
-    scales: object
+    scales: Scales
     without: frozenset[str] = frozenset()
-    verbose: bool = True
-    table: dict[frozenset[str], Fit] = field(default_factory=dict)
+    most: int = 3
+    table: Table = field(init=False)
 
-    def __post_init__(self):
-        problem = self.data.problem
-        tol = problem.campaign.tolerance
-        self.starts: dict[str, list[Cause]] = {}
-        for kind, target in all_candidates(problem, self.without):
-            if kind.latent is not None:
-                continue
+    def __post_init__(self) -> None:
+        self.table = Table(len(self.kinds))
+
+    @cached_property
+    def kinds(self) -> list[tuple]:
+        """Every (effect, target) that may be at work."""
+        return all_candidates(self.data.problem, self.without)
+
+    @cached_property
+    def starts(self) -> dict[str, list[Cause]]:
+        """Candidates without numbers of single records, at all sizes at which they are tried."""
+        found = {}
+        for kind, target in self.kinds:
+            if kind.latent is None:
+                tolerance = self.data.problem.campaign.tolerance
+                found[f"{kind.name}:{target}"] = candidate_starts(
+                    kind, target, self.scales, tolerance
+                )
+        return {label: own for label, own in found.items() if own}
+
+    @property
+    def price(self) -> float:
+        """nats, of a cause: the log of how many there may be."""
+        return math.log(max(self.table.candidates, 1))
+
+    # Fits ----------------------------------------------------------------------------------------
+
+    def fit(
+        self,
+        causes: Sequence[Cause],
+        start: Fit | None = None,
+        windows: Sequence[float | None] = (None,),
+        penalty: float = 0.0,
+    ) -> Fit | None:
+        """A set's fit, kept in the table; None where it leads to no model.
+
+        Args:
+            causes: at the values where to begin.
+            start: a fit at whose other numbers to begin; the stated ones where None.
+            windows: s, up to when; one after the other.
+            penalty: nats, see `Fit.penalty`.
+        """
+        found = start
+        try:
+            for end in windows:
+                likelihood = Percussion(self.data, tuple(causes), end=end)
+                at = likelihood.start(found.at, found.likelihood) if found else likelihood.start()
+                rough = end is not None
+                found = estimate(likelihood, at, tolerance=1.0 if rough else 0.05,
+                                 renewals=4 if rough else 10)  # fmt: skip
+        except FAILED as error:
+            _log.debug("%s: %s", [cause.label for cause in causes], error)
+            return None
+        assert found is not None
+        found = self.table.keep(replace(found, penalty=penalty))
+        _log.debug("fit %s: score %.1f, left %.4f", sorted(labels_of(found)),
+                   self.table.score(found), float(found.objective.sizes.max()))  # fmt: skip
+        return found
+
+    def strained(self, fit: Fit) -> bool:
+        """Whether what is never exact is farther off than chance allows, or more is left.
+
+        Only whether to look farther depends on it.
+
+        Args:
+            fit: of a set of causes.
+        """
+        z = standardised(fit.likelihood.prior, fit.at).shared
+        free = z.size - float(np.trace(fit.covariance))
+        beyond = float(z @ z) > free + 4.0 * math.sqrt(2.0 * free)
+        return bool(fit.objective.sizes.max() > 0.5 * LEFT or beyond or np.abs(z).max() > 4.0)
+
+    @staticmethod
+    def causes_of(fit: Fit) -> tuple[Cause, ...]:
+        """A fit's causes at its values.
+
+        Args:
+            fit: of a set of causes.
+        """
+        own = fit.likelihood.causes
+        effects = fit.likelihood.effects_at(fit.at)[-len(own) :] if own else ()
+        return tuple(replace(c, effect=e) for c, e in zip(own, effects, strict=True))
+
+    # Steps ---------------------------------------------------------------------------------------
+
+    def near(self, fit: Fit) -> list[Fit]:
+        """Fits with one more cause, by what slopes promise."""
+        last = max(r.setup.samples.last for r in self.data.records)
+        promises = screen(fit, self.starts, min(0.6, last), self.price)
+        _log.debug("promised: %s", ", ".join(f"{p.label} {p.gain:.0f}" for p in promises[:8]))
+        causes = self.causes_of(fit)
+        chosen = [p.cause for p in promises[:_NEAR] if p.gain > 0.0]
+        for gain, cause in drawn_candidates(fit, self.kinds, self.scales):
+            if gain > self.price:
+                chosen.append(cause)
+        return self._all(((*causes, cause), fit, (None,)) for cause in chosen)
+
+    def far(self, fit: Fit) -> list[Fit]:
+        """Fits with one more cause from the stated numbers, where those of the fit are strained."""
+        causes = self.causes_of(fit)
+        have = {cause.label for cause in causes}
+        end = WINDOWS[0]
+        scanned = self._scan(causes, [label for label in self.starts if label not in have], end)
+        light = []
+        for _, cause in scanned[:_LIGHT]:
+            likelihood = Percussion(self.data, (*causes, cause), end=end, light=True)
             try:
-                found = candidate_starts(kind, target, self.scales, tol)
-            except InputError:
-                continue
-            if found:
-                self.starts[found[0].label] = found
-        self.price = math.log(max(len(self.starts), 1))
-
-    def say(self, *words):
-        if self.verbose:
-            print(*words, flush=True)
-
-    def score(self, f: Fit) -> float:
-        return f.evidence - self.price * len(f.likelihood.causes)
-
-    def keep(self, f: Fit) -> Fit:
-        key = frozenset(c.label for c in f.likelihood.causes)
-        if key not in self.table or self.score(f) > self.score(self.table[key]):
-            self.table[key] = f
-        self.say("   fit", sorted(key), "phi %.1f score %.1f" % (f.objective.value, self.score(f)),
-                 "chi %.4f" % (sum(f.objective.squares) / sum(f.likelihood.samples)),
-                 "s %.4f/%.4f" % (f.objective.sizes.mean(), f.objective.sizes.max()))
-        return f
-
-    # ------------------------------------------------------------------------------------------
-    def fit(self, causes, x=None, like=None, windows=WINDOWS, **options) -> Fit:
-        f = None
-        for end in windows:
-            m = Percussion(self.data, tuple(causes), end=end)
-            more = {"tolerance": 1.0, "renewals": 4} if end is not None else {}
-            f = estimate(m, m.start(x, like), **{**more, **options})
-            x, like = f.at, f.likelihood
-        return f
-
-    def strained(self, f: Fit) -> bool:
-        z = standardised(f.likelihood.prior, f.at)
-        n = z.shared.size
-        free = n - float(np.trace(f.covariance))
-        return bool(f.objective.sizes.max() > 0.5 * LEFT
-                    or z.shared @ z.shared > free + 4.0 * math.sqrt(2.0 * free)
-                    or np.abs(z.shared).max() > 4.0)
-
-    def columns(self, labels) -> list[tuple[str, Cause, Candidate]]:
-        """Distinct screening columns of candidates."""
-        out = []
-        for label in labels:
-            for cause in self.starts[label]:
-                if any(n.amount for n in cause.numbers):
-                    out.append((label, cause, Candidate(cause.partly(SHARE), SHARE)))
-                    if "modal_share" in cause.effect.values:
-                        other = replace(cause, effect=cause.effect.with_values(modal_share=0.0))
-                        out.append((label, other, Candidate(other.partly(SHARE), SHARE)))
-                else:
-                    out.append((label, cause, Candidate(cause.effect, 1.0)))
-        return out
-
-    def screen(self, f: Fit, end, records=None):
-        """What slopes at a fit promise of every candidate: [(gain in score, label, start, amplitude)]."""
-        t = clock()
-        have = {c.label for c in f.likelihood.causes}
-        cols = self.columns([k for k in self.starts if k not in have])
-        few, at = f.likelihood.some(f.at)
-        m = replace(few, end=end, edges=()).about(at)
-        f = replace(f, at=at)
-        residuals = m.residuals(f.at)
-        slopes = Slopes.of(m, f.at, [c for _, _, c in cols])
-        prior = m.prior
-        n, k = prior.std.shared.size, len(cols)
-        wide = np.array([max([x.std for x in c.numbers if x.amount], default=1.0) for _, c, _ in cols])
-        std = Numbers(np.concatenate([prior.std.shared, wide]), prior.std.groups, prior.std.records)
-        grams = scaled(slopes.grams(residuals), m.group_of, std)
-        now = objective(m, f.at, squares_of(residuals))
-        z = standardised(prior, f.at)
-        z = Numbers(np.concatenate([z.shared, np.zeros(k)]), z.groups, z.records)
-        system = reduce(grams, m.group_of, now.weights, z)
-        a, b = system.precision, system.pull
-        half = np.linalg.solve(a[:n, :n], a[:n, n:])
-        s = a[n:, n:] - a[n:, :n] @ half
-        r = b[n:] - half.T @ b[:n]
-        out = []
-        by_label: dict[str, list[int]] = {}
-        for j, (label, _, _) in enumerate(cols):
-            by_label.setdefault(label, []).append(j)
-        for label, own in by_label.items():
-            names = {tuple(sorted(cols[j][1].effect.values)) for j in own}
-            distinct = self._block(cols, own)
-            if distinct:
-                g = np.linalg.solve(s[np.ix_(own, own)], r[own])
-                gain = 0.5 * r[own] @ g
-                occam = 0.5 * np.linalg.slogdet(s[np.ix_(own, own)])[1]
-                start = self._combined(cols, own, g * wide[own])
-                out.append((gain - occam - self.price, label, start, gain))
-            else:
-                for j in own:
-                    cause = cols[j][1]
-                    if not any(x.amount for x in cause.numbers):
-                        x = min(max(r[j] / s[j, j], 0.2 / wide[j]), 1.5 / wide[j])
-                        gain = r[j] * x - 0.5 * s[j, j] * x * x
-                        out.append((gain - self.price, label, cause, gain))
-                        continue
-                    if cause.effect.values.get("modal_share") == 0.0:
-                        continue
-                    if "modal_share" in cause.effect.values:
-                        both = [j, j + 1]
-                        g = np.linalg.solve(s[np.ix_(both, both)], r[both])
-                        gain, u = 0.5 * r[both] @ g, float(g.sum()) * wide[j]
-                        share = float(np.clip(g[0] / g.sum(), 0.0, 1.0)) if g.sum() else 1.0
-                        cause = replace(cause, effect=cause.effect.with_values(modal_share=share))
-                    else:
-                        gain, u = 0.5 * r[j] ** 2 / s[j, j], r[j] / s[j, j] * wide[j]
-                    if u <= 0 and not self._two_sided(cause):
-                        continue
-                    occam = 0.5 * math.log(s[j, j])
-                    out.append((gain - occam - self.price, label, self._moved(cause, u), gain))
-        out.sort(key=lambda o: -o[0])
-        best, seen = [], set()
-        for o in out:
-            if o[1] not in seen:
-                seen.add(o[1])
-                best.append(o)
-        self.say("screen %.1f s:" % (clock() - t), ", ".join("%s %.0f" % (o[1], o[0]) for o in best[:8]))
-        return best
-
-    @staticmethod
-    def _two_sided(cause):
-        return all(x.low < 0 for x in cause.numbers if x.amount)
-
-    @staticmethod
-    def _block(cols, own):
-        """Whether an effect's columns are of different numbers: all together are one candidate."""
-        if len(own) < 2:
-            return False
-        which = [tuple(n.parameter for n, u in zip(cols[j][1].numbers, cols[j][1].coordinates(cols[j][1].effect)) if n.amount and abs(u) > 1e-9) for j in own]
-        return len(set(which)) == len(which) and all(which)
-
-    @staticmethod
-    def _combined(cols, own, amplitude):
-        cause = cols[own[0]][1]
-        u = [0.0] * len(cause.numbers)
-        for j, a in zip(own, amplitude):
-            for i, (n, x) in enumerate(zip(cols[j][1].numbers, cols[j][1].coordinates(cols[j][1].effect))):
-                if n.amount and abs(x) > 1e-9:
-                    u[i] = min(max(x * a, n.low), n.high)
-                elif not n.amount:
-                    u[i] = x
-        return replace(cause, effect=cause.at(u))
-
-    @staticmethod
-    def _moved(cause, amplitude):
-        a = min(max(amplitude, -4.0), 4.0)
-        u = [min(max(x * a, n.low), n.high) if n.amount else x
-             for n, x in zip(cause.numbers, cause.coordinates(cause.effect))]
-        return replace(cause, effect=cause.at(u))
-
-    # ------------------------------------------------------------------------------------------
-    def scan(self, causes, x, like, labels, end):
-        """Every candidate at several sizes about given numbers, with springs, damping and force moved linearly."""
-        t = clock()
-        m = Percussion(self.data, tuple(causes), end=end, light=True)
-        at = m.start(x, like)
-        lin = m.linearised(at)
-        base = m.residuals(at)
-        now = objective(m, at, squares_of(base))
-        out = []
-        for label in labels:
-            best = None
-            for cause in self.starts[label]:
-                sizes = (1.0,)
-                if any(n.amount for n in cause.numbers):
-                    sizes = (0.5, 1.0, 2.0, 4.0)
-                    if self._two_sided(cause) and len(self.starts[label]) == 1:
-                        sizes = (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0, 4.0)
-                for size in sizes:
-                    moved = self._moved(cause, size) if any(n.amount for n in cause.numbers) else cause
-                    m2 = Percussion(self.data, (*causes, moved), end=end, light=True)
-                    try:
-                        e = m2.residuals(m2.start(at, m))
-                    except FAILED:
-                        continue
-                    grams = scaled(lin.grams(e), m.group_of, m.prior.std)
-                    then = objective(m, at, squares_of(e))
-                    system = reduce(grams, m.group_of, then.weights, standardised(m.prior, at))
-                    gain = 0.5 * system.pull @ np.linalg.solve(system.precision, system.pull)
-                    value = then.value - min(gain, then.value)
-                    phi = then.value - gain
-                    if best is None or phi < best[0]:
-                        best = (phi, label, moved)
-            if best:
-                out.append(best)
-        out.sort(key=lambda o: o[0])
-        self.say("scan %.1f s, nothing %.0f:" % (clock() - t, now.value), ", ".join("%s %.0f" % (o[1], o[0]) for o in out[:8]))
-        return out
-
-    def light(self, causes, x, like, scanned, most=16):
-        t = clock()
-        out = []
-        for _, label, cause in scanned[:most]:
-            m = Percussion(self.data, (*causes, cause), end=WINDOWS[0], light=True)
-            try:
-                f = estimate(m, m.start(x, like), tolerance=2.0, renewals=3, steps=5)
+                found = estimate(likelihood, likelihood.start(), tolerance=2.0, renewals=3, steps=5)
             except FAILED:
                 continue
-            out.append((f.objective.value, label, f))
-        out.sort(key=lambda o: o[0])
-        self.say("light %.1f s:" % (clock() - t), ", ".join("%s %.0f" % (o[1], o[0]) for o in out[:8]))
-        return out
+            light.append(found)
+        light.sort(key=lambda one: one.objective.value)
+        _log.debug(
+            "light: %s",
+            ", ".join(
+                f"{one.likelihood.causes[-1].label} {one.objective.value:.0f}" for one in light[:8]
+            ),
+        )
+        return self._race(light[:_RACE])
 
-    def race(self, causes, runners, most=6):
-        """Fits on growing windows, the leaders go on."""
-        t = clock()
-        field_ = [(f.likelihood.causes[-1], f.at, f.likelihood) for _, _, f in runners[:most]]
-        for i, end in enumerate(WINDOWS):
-            new = []
-            for cause, x, like in field_:
-                m = Percussion(self.data, (*causes, cause), end=end)
+    def _scan(
+        self, causes: tuple[Cause, ...], labels: Sequence[str], end: float | None
+    ) -> list[tuple[float, Cause]]:
+        """Each candidate at its best size, springs, damping and force moved with it by slopes."""
+        light = Percussion(self.data, causes, end=end, light=True)
+        at = light.start()
+        slopes = light.linearised(at)
+        found = []
+        for label in labels:
+            tried = []
+            for cause in self.starts[label]:
+                sizes: Iterable[float] = (1.0,)
+                if any(n.amount for n in cause.numbers):
+                    both = len(self.starts[label]) == 1 and all(
+                        n.low < 0.0 for n in cause.numbers if n.amount
+                    )
+                    sizes = (*(-s for s in _SIZES if both), *_SIZES)
+                tried += [times(cause, s) if s != 1.0 else cause for s in sizes]
+            values = []
+            for cause in tried:
+                more = Percussion(self.data, (*causes, cause), end=end, light=True)
                 try:
-                    new.append(estimate(m, m.start(x, like), tolerance=1.0 if end else 0.05, renewals=4 if end else 8))
+                    residuals = more.residuals(more.start(at, light))
                 except FAILED:
                     continue
-            new.sort(key=lambda f: -f.evidence)
-            self.say("  window", end, "%.1f s" % (clock() - t), ", ".join("%s %.0f" % (f.likelihood.causes[-1].label, f.evidence - new[0].evidence) for f in new))
-            near = [f for f in new if f.evidence > new[0].evidence - (200 if end else 100)][: 4 if i == 0 else 3]
-            field_ = [(f.likelihood.causes[-1], f.at, f.likelihood) for f in near]
-        return [self.keep(f) for f in new]
+                then = objective(light, at, squares_of(residuals))
+                grams = scaled(slopes.grams(residuals), light.group_of, light.prior.std)
+                system = reduce(grams, light.group_of, then.weights, standardised(light.prior, at))
+                gain = 0.5 * float(system.pull @ np.linalg.solve(system.precision, system.pull))
+                values.append((then.value - gain, cause))
+            if values:
+                found.append(min(values, key=lambda one: one[0]))
+        return sorted(found, key=lambda one: one[0])
 
-    def latents(self, f: Fit):
-        """What numbers drawn anew in every record promise at a fit: [(gain in score, cause)]."""
-        t = clock()
-        problem = self.data.problem
-        have = {c.label for c in f.likelihood.causes}
-        out = []
-        for kind, target in all_candidates(problem, self.without):
-            latent = kind.latent
-            if latent is None or latent.whole or f"{kind.name}:{target}" in have:
-                continue
-            for values in kind(target).trials(self.scales):
-                unit = 1.0
-                effect = kind(target).bounded(**values, **{latent.spread: unit})
-                cause = cause_of(effect, [values], problem.campaign.tolerance)
-                m = replace(f.likelihood, causes=(*f.likelihood.causes, cause))
-                at = m.start(f.at, f.likelihood)
-                slopes = m.linearised(at)
-                grams = slopes.grams(f.residuals)
-                rms = self.scales.reading[target][0] if target in self.scales.reading else self.scales.period
-                best = None
-                plain = None
-                for size in (0.0, *np.geomspace(1e-5, 1.0, 16) * rms):
-                    std = m.prior.std
-                    records = []
-                    for k in range(len(m.data.records)):
-                        mine = np.array([o.__class__.__name__ == "Drawn" for o, _ in m.own(k)])
-                        tol = getattr(problem.campaign.tolerance, kind.exceeds, 0.0) if kind.exceeds else 0.0
-                        records.append(np.where(mine, max(np.hypot(size, tol), 1e-12), std.records[k]))
-                    std = Numbers(std.shared, std.groups, tuple(records))
-                    g = scaled(grams, m.group_of, std)
-                    z = (at + m.prior.mean.scaled(-1.0)) / std
-                    system = reduce(g, m.group_of, f.objective.weights, z)
-                    _, log_det = np.linalg.slogdet(system.precision)
-                    value = 0.5 * system.pull @ np.linalg.solve(system.precision, system.pull)
-                    value += self._own_gain(g, m, f.objective.weights, z) - 0.5 * (system.log_determinant + log_det)
-                    if size == 0.0:
-                        plain = value
-                    elif best is None or value - plain > best[0]:
-                        best = (value - plain, size)
-                out.append((best[0] - self.price, replace(cause, effect=effect.with_values(**{latent.spread: best[1]}))))
-        out.sort(key=lambda o: -o[0])
-        self.say("latents %.1f s:" % (clock() - t), ", ".join("%s %.1f" % (c.effect, g) for g, c in out[:4]))
-        return out
+    def _race(self, runners: Sequence[Fit]) -> list[Fit]:
+        """Fits of the runners' sets on growing windows; those far behind are left."""
+        field_ = list(runners)
+        for end in WINDOWS:
+            ran = []
+            for one in field_:
+                likelihood = Percussion(self.data, one.likelihood.causes, end=end)
+                try:
+                    at = likelihood.start(one.at, one.likelihood)
+                    ran.append(estimate(likelihood, at, tolerance=1.0 if end else 0.05,
+                                        renewals=4 if end else 10))  # fmt: skip
+                except FAILED:
+                    continue
+            ran.sort(key=lambda one: -one.evidence)
+            field_ = [one for one in ran if one.evidence > ran[0].evidence - 200.0][: _RACE // 2]
+        return [self.table.keep(one) for one in field_]
 
-    @staticmethod
-    def _own_gain(grams, m, weights, z):
-        """What eliminated numbers gain by themselves: half the squared pull over the precision."""
-        total = 0.0
-        for k, gram in enumerate(grams):
-            n = z.records[k].size
-            own = weights[m.group_of[k]] * gram[:n, :n] + np.eye(n)
-            pull = weights[m.group_of[k]] * gram[:n, -1] - z.records[k]
-            total += 0.5 * pull @ np.linalg.solve(own, pull)
-        return total
+    def _all(
+        self, sets: Iterable[tuple[Sequence[Cause], Fit | None, Sequence[float | None]]]
+    ) -> list[Fit]:
+        found = [self.fit(causes, start, windows) for causes, start, windows in sets]
+        return [one for one in found if one is not None]
 
-    def near(self, f: Fit, screened, most=5):
-        out = []
-        top = [o for o in screened[:most] if o[0] > -2.0]
-        for _, label, start, _ in top:
-            try:
-                out.append(self.keep(self.fit((*f.likelihood.causes, start), f.at, f.likelihood, windows=(None,))))
-            except FAILED:
-                continue
-        return out
-
-    def run(self, most=2):
-        t = clock()
-        null = self.keep(self.fit(()))
-        self.null = null
-        zero = Percussion(self.data).start()
-        cur = null
-        for _ in range(most):
-            fits = []
-            best_s = cur.objective.sizes.max()
-            if best_s < 5 * LEFT:
-                sc = self.screen(cur, None if self.data.problem.records[0].setup.samples.last < 0.5 else 0.6)
-                fits += self.near(cur, sc)
-                for gain, cause in self.latents(cur):
-                    if gain > 0.0:
-                        fits.append(self.keep(self.fit((*cur.likelihood.causes, cause), cur.at, cur.likelihood, windows=(None,))))
-            top = max([cur, *fits], key=self.score)
-            if self.strained(top):
-                have = {c.label for c in cur.likelihood.causes}
-                causes = tuple(replace(c, effect=e) for c, e in zip(cur.likelihood.causes, cur.likelihood.effects_at(cur.at)[-len(cur.likelihood.causes):] if cur.likelihood.causes else ()))
-                base = Percussion(self.data, causes)
-                x = base.start()
-                scanned = self.scan(causes, x, base, [k for k in self.starts if k not in have], WINDOWS[0])
-                fits += self.race(causes, self.light(causes, x, base, scanned))
-            better = [f for f in fits if self.score(f) > self.score(cur)]
-            if not better:
+    def _missing(self, fit: Fit) -> list[Fit]:
+        """The fit in which blows are missing, found again until they stay the same."""
+        found: list[Fit] = []
+        cause, count = missing_blows(fit, self.kinds)
+        for _ in range(3):
+            if cause is None:
                 break
-            cur = max(better, key=self.score)
-        while len(cur.likelihood.causes) > 1:
-            drops = []
-            for c in cur.likelihood.causes:
-                rest = tuple(o for o in cur.likelihood.causes if o is not c)
-                drops.append(self.keep(self.fit(rest, cur.at, cur.likelihood, windows=(None,))))
-            b = max(drops, key=self.score)
-            if self.score(b) < self.score(cur) - CLAIM:
+            penalty = count * math.log(max(r.setup.blows.start.size for r in self.data.records))
+            rest = [c for c in self.causes_of(fit) if c.label != cause.label]
+            windows = WINDOWS if not found else (None,)
+            one = self.fit((*rest, cause), found[-1] if found else None, windows, penalty)
+            if one is None:
                 break
-            cur = b
-        self.best = cur
-        self.seconds = clock() - t
-        return self.verdict()
+            found.append(one)
+            again, count = missing_blows(one, self.kinds)
+            if again is None or again.effect.hidden == cause.effect.hidden:
+                break
+            cause = again
+        return found
 
-    def verdict(self):
-        cur = max(self.table.values(), key=self.score)
-        s = math.sqrt(float((cur.objective.sizes**2).mean()))
-        sets = [(self.score(f), k, f) for k, f in self.table.items()]
-        rivals = [(v, sorted(k)) for v, k, f in sets if v > self.score(cur) - CLAIM and k != frozenset(c.label for c in cur.likelihood.causes)]
-        nothing = self.score(self.table[frozenset()])
-        total = np.logaddexp.reduce([v for v, k, _ in sets if k])if len(sets) > 1 else -np.inf
-        claim = total - nothing
-        if claim < CLAIM or not cur.likelihood.causes:
-            verdict = "nothing-wrong" if math.sqrt(float((self.null.objective.sizes**2).mean())) < LEFT else "unexplained"
-            names = []
-        else:
-            rivals = [r for r in rivals if r[1]]
-            names = sorted(c.label for c in cur.likelihood.causes)
-            verdict = "unexplained" if s > LEFT else "ambiguous" if rivals else "named"
-        return {"verdict": verdict, "causes": names, "rivals": rivals, "s": s, "odds": claim, "seconds": self.seconds}
+    def run(self) -> Judged:
+        """The verdict."""
+        now = self.fit((), windows=WINDOWS)
+        if now is None:
+            raise InputError("no model that can be computed at the stated values")
+        for _ in range(self.most):
+            tried = self.near(now) if now.objective.sizes.max() < 5.0 * LEFT else []
+            if self.strained(max([now, *tried], key=self.table.score)):
+                tried += self._missing(now)
+            if self.strained(max([now, *tried], key=self.table.score)):
+                tried += self.far(now)
+            best = max([now, *tried], key=self.table.score)
+            if best is now:
+                break
+            now = best
+        self._dropped(self.table.best)
+        return judge(self.table)
+
+    def _dropped(self, fit: Fit) -> None:
+        """Fits without each of the causes, as long as fewer do better."""
+        while len(labels_of(fit)) > 1:
+            for cause in self.causes_of(fit):
+                rest = [c for c in self.causes_of(fit) if c.label != cause.label]
+                if frozenset(c.label for c in rest) not in self.table.fits:
+                    self.fit(rest, fit)
+            if self.table.best is fit:
+                return
+            fit = self.table.best

@@ -11,18 +11,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from numba import njit
 
 from picchio.core.arrays import BoolArray, ComplexArray, FloatArray, IndexArray
 from picchio.core.errors import InputError
 from picchio.diagnosis.evidence.numbers import Numbers
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord
 from picchio.diagnosis.percussion.tolerance.nudges import POSE, Inexact, Nudge, as_effects
+from picchio.diagnosis.struck.strike_kernel import answer, whiten_all
 from picchio.measurement.noise.autoregression import AutoRegression
-from picchio.measurement.noise.whiten_kernel import whiten
 from picchio.model.effects.effect import Effect
 from picchio.model.model import Model
 from picchio.model.sensing import SensorChain
@@ -34,7 +33,8 @@ from picchio.prediction.percussion import (
     _slopes_of,
     apply_filters,
 )
-from picchio.vibration.integration.sensitivity import Strike, _Modes, blow_changes
+from picchio.vibration.integration.integrate import AtJumps, Samples
+from picchio.vibration.integration.sensitivity import Strike, _Modes
 
 if TYPE_CHECKING:
     from picchio.diagnosis.struck.likelihood import Percussion
@@ -152,7 +152,7 @@ class RecordSlopes:
         for f in self.families:
             onto = residual[list(f.rows)] @ f.basis.T
             weighed += np.tensordot(f.weights, onto, 2)
-        plain = self.explicit.reshape(len(self.explicit), -1) @ residual.ravel()
+        plain = np.tensordot(self.explicit, residual, 2)
         out[:n, n] = out[n, :n] = np.concatenate([weighed, plain])[self.index]
         out[n, n] = float(np.vdot(residual, residual))
         return out
@@ -244,16 +244,28 @@ class _Pose:
         self.there = {k: of.there(k, at, self.base) for k in records}
         self.setups = {k: self.there[k][0].until(of.end) for k in records}
         self.struck = {k: self.setups[k].struck(self.there[k][1]) for k in records}
-        self.exact = {k: self.setups[k]._system(self.there[k][1], self.struck[k].blows) for k in records}
-        self.systems = {k: _linear(self.setups[k], self.there[k][1], self.exact[k]) for k in records}
+        self.exact = {
+            k: self.setups[k]._system(self.there[k][1], self.struck[k].blows) for k in records
+        }
+        self.systems = {
+            k: _linear(self.setups[k], self.there[k][1], self.exact[k]) for k in records
+        }
         first = records[0]
-        self.model, self.setup, self.system = self.there[first][1], self.setups[first], self.exact[first]
-        self.chains = {g: self.model.sensors(self.setup.conditions).get(g) for g in self.setup.groups}
+        self.model, self.setup, self.system = (
+            self.there[first][1],
+            self.setups[first],
+            self.exact[first],
+        )
+        self.chains = {
+            g: self.model.sensors(self.setup.conditions).get(g) for g in self.setup.groups
+        }
         self.drifts = any(e.where == "over-time" for e in self.base)
 
     def system_of(self, model: Model, k: int) -> VibratingSystem:
         """Of a model, without its nonlinear elements."""
-        return replace(self.setups[k]._system(model, self.struck[k].blows), elements=(), rows=np.zeros((0, 1)))
+        return replace(
+            self.setups[k]._system(model, self.struck[k].blows), elements=(), rows=np.zeros((0, 1))
+        )
 
     def moved(self, one: Inexact, step: float) -> Model:
         """The first record's model with a number of blows or sensors moved on."""
@@ -269,7 +281,9 @@ class _Pose:
 
     # One column each -----------------------------------------------------------------------
 
-    def structural(self, before: Model, after: Model, size: float, effect_drifts: bool = False) -> list[Column] | None:
+    def structural(
+        self, before: Model, after: Model, size: float, effect_drifts: bool = False
+    ) -> list[Column] | None:
         """Of two models whose equations differ; None where they have other coordinates."""
         out, known = [], None
         for k in self.records:
@@ -286,7 +300,10 @@ class _Pose:
         if self.of.light:
             return [_NONE] * len(self.records)
         if one.where == "structure":
-            ends = [_under(self.model, Nudge([(one, np.array([s]))], "structure")) for s in (-_STEP, _STEP)]
+            ends = [
+                _under(self.model, Nudge([(one, np.array([s]))], "structure"))
+                for s in (-_STEP, _STEP)
+            ]
             found = self.structural(ends[0], ends[1], 2.0 * _STEP)
             assert found is not None
             return found
@@ -300,7 +317,9 @@ class _Pose:
                 if known is None or self.drifts:
                     near = replace(self.setups[k], geometry=geometry)
                     after = near._system(self.there[k][1], self.struck[k].blows)
-                    known = Column("change", change=Change.between(self.exact[k], after, size, seen=True))
+                    known = Column(
+                        "change", change=Change.between(self.exact[k], after, size, seen=True)
+                    )
                 out.append(known)
             return out
         if one.where == "sensor":
@@ -324,7 +343,9 @@ class _Pose:
         ours = self.struck[k]
         if one.alike(other) and one.alike(ours):
             turned = (other.blows.direction - one.blows.direction) / size
-            return Column("force", direction=turned, louder=(other.peak - one.peak) / ours.peak / size)
+            return Column(
+                "force", direction=turned, louder=(other.peak - one.peak) / ours.peak / size
+            )
         return Column("strikes", strikes=tuple(_differing(one, other)), size=size)
 
     def effect(self, now: Effect, ends: Sequence[Effect], size: float) -> list[Column]:
@@ -334,16 +355,20 @@ class _Pose:
         if now.where in _STRUCTURAL:
             found = self.structural(first[0], first[1], size) if not self.drifts else None
             if found is None and self.drifts:
-                found = []
-                for k, (b, a) in pairs.items():
-                    found.append(Column("change", change=Change.between(self.system_of(b, k), self.system_of(a, k), size)))
+                found = [
+                    Column("change", change=Change.between(
+                        self.system_of(pair[0], k), self.system_of(pair[1], k), size))
+                    for k, pair in pairs.items()
+                ]  # fmt: skip
             if found is not None:
                 return found
         if now.where == "blows":
-            return [self.blows(k, *pairs[k], size) for k in self.records]
+            return [self.blows(k, pairs[k][0], pairs[k][1], size) for k in self.records]
         if now.where == "sensor" and self.plain(first):
             return [self.sensor(first[0], first[1], size)] * len(self.records)
-        return [Column("models", models=(pairs[k][0], pairs[k][1]), size=size) for k in self.records]
+        return [
+            Column("models", models=(pairs[k][0], pairs[k][1]), size=size) for k in self.records
+        ]
 
     def plain(self, models: Sequence[Model]) -> bool:
         """Whether sensors of all models differ from today's in place, axes and gain alone."""
@@ -352,8 +377,23 @@ class _Pose:
                 other = model.sensors(self.setup.conditions).get(g)
                 if replace(other, place=now.place, turn=now.turn, gain=now.gain) != now:
                     try:
-                        same = (other.mount, other.highpass, other.lowpass, other.delay, other.clock_rate, other.limit, other.hum) == (
-                            now.mount, now.highpass, now.lowpass, now.delay, now.clock_rate, now.limit, now.hum)
+                        same = (
+                            other.mount,
+                            other.highpass,
+                            other.lowpass,
+                            other.delay,
+                            other.clock_rate,
+                            other.limit,
+                            other.hum,
+                        ) == (
+                            now.mount,
+                            now.highpass,
+                            now.lowpass,
+                            now.delay,
+                            now.clock_rate,
+                            now.limit,
+                            now.hum,
+                        )
                     except ValueError:
                         same = False
                     if not same:
@@ -366,8 +406,19 @@ class _Pose:
         first = pairs[self.records[0]]
         try:
             if one.effect.where in _STRUCTURAL and one.share < 0.5:
-                found = self.structural(first[0], first[1], one.share, one.effect.where == "over-time") if not self.drifts and one.effect.where != "over-time" else [
-                    Column("change", change=Change.between(self.system_of(b, k), self.system_of(a, k), one.share)) for k, (b, a) in pairs.items()]
+                found = (
+                    self.structural(first[0], first[1], one.share, one.effect.where == "over-time")
+                    if not self.drifts and one.effect.where != "over-time"
+                    else [
+                        Column(
+                            "change",
+                            change=Change.between(
+                                self.system_of(b, k), self.system_of(a, k), one.share
+                            ),
+                        )
+                        for k, (b, a) in pairs.items()
+                    ]
+                )
                 if found is not None:
                     return found
             if one.effect.where == "blows" and one.share < 0.5:
@@ -414,8 +465,8 @@ class _Pose:
                     sigma = float(getattr(of.data.problem.campaign.tolerance, one.key))
                     blows.append((sigma, one.key == "blow_time", blow))
                 else:
-                    ends = [self.moved_of(k, one, s) for s in (-_STEP, _STEP)]
-                    head.append(self.blows(k, ends[0], ends[1], 2.0 * _STEP))
+                    low, high = (self.moved_of(k, one, s) for s in (-_STEP, _STEP))
+                    head.append(self.blows(k, low, high, 2.0 * _STEP))
             columns = head + [c[i] for c in tail]
             found[k] = _Record(self, k).slopes(columns, blows)
         return found
@@ -457,80 +508,118 @@ class _Record:
         if modes is None:
             raise InputError("no independent modes of vibration")
         members: dict[str, list[int]] = {}
-        for i, c in enumerate(channels):
-            members.setdefault(c.group, []).append(i)
+        for i, channel in enumerate(channels):
+            members.setdefault(channel.group, []).append(i)
         edges = self.of.edges[self.k]
-        series_of: dict[object, tuple] = {}
+        series_of: dict[object, tuple[Any, ...]] = {}
         for group, rows in members.items():
             first = channels[rows[0]]
-            chain = self.pose.chains[group] if not self.pose.drifts else self.model.sensors(setup.conditions).get(group)
+            chain = (
+                self.pose.chains[group]
+                if not self.pose.drifts
+                else self.model.sensors(setup.conditions).get(group)
+            )
             taken = setup._taken(first, chain)
             chain, key = taken.chain, (taken.samples, taken.at_jumps)
             if key not in series_of:
                 plan = setup._plan(self.struck, self.system, *key)
                 y, slope, pushed = modes.series(plan, taken.samples.count)
                 whole = np.concatenate([y.real, y.imag, slope.real, slope.imag, pushed[None]])
-                series_of[key] = whole, self._weights(modes, weighed), _Strikes.of(modes, self.struck, *key)
+                series_of[key] = (
+                    whole,
+                    self._weights(modes, weighed),
+                    _Strikes.of(modes, self.struck, *key),
+                )
             whole, (position, velocity, acceleration), strikes = series_of[key]
             reader = _slopes_of(first, chain, self.system)
             silent = not any(part.any() for part in reader)
             if first.kind.axes:
                 pick = ["xyz".index(channels[i].axis or "x") for i in rows]
             elif first.kind.of == "joint":
-                pick = [setup.geometry.robot.flexible_names.index(channels[i].subject or "") for i in rows]
+                pick = [
+                    setup.geometry.robot.flexible_names.index(channels[i].subject or "")
+                    for i in rows
+                ]
             else:
                 pick = [0] * len(rows)
             axes = bool(first.kind.axes)
 
-            def through(link: SensorChain, values: FloatArray, axes: bool = axes, pick: list[int] = pick) -> FloatArray:
+            def through(
+                link: SensorChain, values: FloatArray, axes: bool = axes, pick: list[int] = pick
+            ) -> FloatArray:
                 """Of what is read (..., rows, S): behind axes and gain."""
                 turned = link.turn @ values if axes else values
                 return np.asarray(link.gain * turned[..., pick, :])
 
-            def read(by: tuple[FloatArray, FloatArray, FloatArray], which: int, position=position, velocity=velocity, acceleration=acceleration) -> FloatArray:
-                return by[0] @ position[which] + by[1] @ velocity[which] + by[2] @ acceleration[which]
+            def read(
+                by: tuple[FloatArray, FloatArray, FloatArray],
+                which: int,
+                position: FloatArray = position,
+                velocity: FloatArray = velocity,
+                acceleration: FloatArray = acceleration,
+            ) -> FloatArray:
+                return (
+                    by[0] @ position[which] + by[1] @ velocity[which] + by[2] @ acceleration[which]
+                )
 
             weights = np.zeros((len(weighed), len(rows), len(whole)))
             if not silent:
                 base = read(reader, -1)
-                every = np.tensordot(reader[0], position, (1, 1)) + np.tensordot(reader[1], velocity, (1, 1)) + np.tensordot(reader[2], acceleration, (1, 1))
+                every = (
+                    np.tensordot(reader[0], position, (1, 1))
+                    + np.tensordot(reader[1], velocity, (1, 1))
+                    + np.tensordot(reader[2], acceleration, (1, 1))
+                )
                 every = np.moveaxis(every, 1, 0)  # (numbers + 1, rows, S)
                 weights[:] = through(chain, every[:-1])
                 for w, c in enumerate(weighed):
                     if c.kind == "change" and c.change is not None and c.change.moved is not None:
                         seen, size = c.change.moved
-                        weights[w] += through(chain, (read(_slopes_of(first, chain, seen), -1) - base) / size)
+                        weights[w] += through(
+                            chain, (read(_slopes_of(first, chain, seen), -1) - base) / size
+                        )
                     elif c.kind == "sensor" and c.chains is not None:
                         ends = [c.chains[0][group], c.chains[1][group]]
-                        if ends[0] is ends[1] or all(np.array_equal(ends[0].turn, e.turn) and ends[0].gain == e.gain and np.array_equal(ends[0].place, e.place) for e in ends):
+                        if ends[0] is ends[1] or all(
+                            np.array_equal(ends[0].turn, e.turn)
+                            and ends[0].gain == e.gain
+                            and np.array_equal(ends[0].place, e.place)
+                            for e in ends
+                        ):
                             continue
                         both = []
                         for link in ends:
-                            by = reader if np.array_equal(link.place, chain.place) else _slopes_of(first, link, self.system)
+                            by = (
+                                reader
+                                if np.array_equal(link.place, chain.place)
+                                else _slopes_of(first, link, self.system)
+                            )
                             both.append(through(link, base if by is reader else read(by, -1)))
                         weights[w] = (both[1] - both[0]) / c.size
             series = whole
             if chain.filters:
-                series = apply_filters(chain, series, taken.samples.step, taken.factor)[..., taken.lead :]
+                series = apply_filters(chain, series, taken.samples.step, taken.factor)[
+                    ..., taken.lead :
+                ]
             free = setup.steady or first.kind.free_offset
             unknown = edges[group][:count] if edges is not None and first.kind.jumps else None
             noise = [own.noise[channels[i].name].model for i in rows]
             dead: list[BoolArray | None] = [unknown] * len(rows)
             if np.isfinite(chain.limit):
                 now = setup._group(self.model, chain, [channels[i] for i in rows])
-                for c, i in enumerate(rows):
+                for r, i in enumerate(rows):
                     clipped = np.abs(now[channels[i].name]) >= chain.limit
-                    dead[c] = clipped if unknown is None else clipped | unknown
+                    dead[r] = clipped if unknown is None else clipped | unknown
             alike: dict[object, list[int]] = {}
-            for c in range(len(rows)):
-                name = noise[c].reflection.tobytes(), None if dead[c] is unknown else c
-                alike.setdefault(name, []).append(c)
+            for r in range(len(rows)):
+                name = noise[r].reflection.tobytes(), None if dead[r] is unknown else r
+                alike.setdefault(name, []).append(r)
             for own_rows in alike.values():
                 lead = own_rows[0]
                 basis = _whitened(series, noise[lead], dead[lead], free, unknown)
-                scale = np.sqrt([noise[lead].variance / noise[c].variance for c in own_rows])
-                w = weights[:, own_rows] * scale[:, None]
-                families.append(Family(tuple(rows[c] for c in own_rows), basis, w))
+                scale = np.sqrt([noise[lead].variance / noise[r].variance for r in own_rows])
+                own_weights = weights[:, own_rows] * scale[:, None]
+                families.append(Family(tuple(rows[r] for r in own_rows), basis, own_weights))
             if silent:
                 continue
             on = strikes.weights
@@ -546,9 +635,11 @@ class _Record:
                     sigma, later, blow = next(mine)
                     values = sigma * (block @ strikes.of_blow(blow, later))
                 if chain.filters:
-                    values = apply_filters(chain, values, taken.samples.step, taken.factor)[..., taken.lead :]
-                for c_, i in enumerate(rows):
-                    explicit[e, i] = _whitened(values[c_][None], noise[c_], dead[c_], free, unknown)[0]
+                    values = apply_filters(chain, values, taken.samples.step, taken.factor)[
+                        ..., taken.lead :
+                    ]
+                for r, i in enumerate(rows):
+                    explicit[e, i] = _whitened(values[r][None], noise[r], dead[r], free, unknown)[0]
         for e, c in enumerate(listed):
             if c.line is not None:
                 effect, place = c.line
@@ -557,7 +648,11 @@ class _Record:
                 for i in members.get(effect.target, []):
                     model = own.noise[channels[i].name].model
                     free = setup.steady or channels[i].kind.free_offset
-                    unknown = edges[effect.target][:count] if edges is not None and channels[i].kind.jumps else None
+                    unknown = (
+                        edges[effect.target][:count]
+                        if edges is not None and channels[i].kind.jumps
+                        else None
+                    )
                     explicit[e, i] = _whitened(wave[None], model, unknown, free, unknown)[0]
         now_left: FloatArray | None = None
         for e, c in enumerate(listed):
@@ -576,11 +671,17 @@ class _Record:
                 explicit[e] = 0.0
         return RecordSlopes(tuple(families), explicit, np.array(places, dtype=np.intp))
 
-    def _weights(self, modes: _Modes, columns: Sequence[Column]) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """(numbers + 1, n, S) weights of position, velocity, acceleration on the series; last the motion itself."""
+    def _weights(
+        self, modes: _Modes, columns: Sequence[Column]
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(numbers + 1, n, S) weights of position, velocity, acceleration; last the motion's."""
         system, direction = self.system, self.struck.blows.direction
         n, count = len(system.coordinates), len(columns)
-        mass, held, force = np.zeros((count + 1, n, n)), np.zeros((count + 1, n, 2 * n)), np.zeros((count + 1, n))
+        mass, held, force = (
+            np.zeros((count + 1, n, n)),
+            np.zeros((count + 1, n, 2 * n)),
+            np.zeros((count + 1, n)),
+        )
         louder = np.zeros(count + 1)
         louder[-1] = 1.0
         for i, c in enumerate(columns):
@@ -599,7 +700,9 @@ class _Record:
         quotient = np.where(alike, 0.0, among * modes.driven / np.where(alike, 1.0, apart))
         weights = quotient.astype(complex)
         index = np.arange(2 * n)
-        weights[:, index, index] += push @ back[:, n:].T - quotient.sum(axis=2) + louder[:, None] * modes.driven
+        weights[:, index, index] += (
+            push @ back[:, n:].T - quotient.sum(axis=2) + louder[:, None] * modes.driven
+        )
         on, slopes = modes.modes @ weights, modes.modes @ np.where(alike, among * modes.driven, 0.0)
 
         def rows(first: ComplexArray, second: ComplexArray, straight: FloatArray) -> FloatArray:
@@ -619,8 +722,6 @@ class _Strikes:
     """What single blows do, as series that all channels share.
 
     Attributes:
-        modes: of the system.
-        struck: the record's blows.
         poles: (m,) of the modes that are kept.
         blows: (blows, m, count) the answer to each of the record's blows, and (blows, count) its
             force.
@@ -629,15 +730,14 @@ class _Strikes:
         key: samples, and how jumps are taken.
     """
 
-    system: VibratingSystem
     poles: ComplexArray
     blows: ComplexArray
     forces: FloatArray
     weights: tuple[FloatArray, FloatArray, FloatArray]
-    key: tuple
+    key: tuple[Samples, AtJumps]
 
     @classmethod
-    def of(cls, modes: _Modes, struck: Struck, samples, at_jumps) -> _Strikes:
+    def of(cls, modes: _Modes, struck: Struck, samples: Samples, at_jumps: AtJumps) -> _Strikes:
         """Of a record's blows."""
         poles, blows = modes.poles[modes.kept], struck.blows
         hits = np.unique(blows.hit) if blows.period is None else np.zeros(0)
@@ -649,8 +749,18 @@ class _Strikes:
             last = shape.end if np.isfinite(shape.end) else float(shape.start[-1])
             for k in range(blows.start.size):
                 h = int(np.searchsorted(hits, blows.hit[k]))
-                _answer(poles, pieces, *waves, last, float(blows.start[k]), float(height[k]),
-                        samples.start, samples.step, answers[h], forces[h])
+                answer(
+                    poles,
+                    pieces,
+                    *waves,
+                    last,
+                    float(blows.start[k]),
+                    float(height[k]),
+                    samples.start,
+                    samples.step,
+                    answers[h],
+                    forces[h],
+                )
         n = len(modes.inverse)
         on = modes.modes * modes.driven
         moving = on[n:]
@@ -661,7 +771,7 @@ class _Strikes:
             np.hstack([modes.real(moving), none]),
             np.hstack([modes.real(moving * modes.poles), at_once]),
         )
-        return cls(modes, poles, answers, forces, weights, (samples, at_jumps))
+        return cls(poles, answers, forces, weights, (samples, at_jumps))
 
     def of_blow(self, blow: int, later: bool) -> FloatArray:
         """(2m + 1, count) by a blow's relative height, or by the time when it comes."""
@@ -680,84 +790,20 @@ class _Strikes:
             shape = s.shape
             pieces = np.column_stack([shape.start, shape.constant, shape.slope])
             last = shape.end if np.isfinite(shape.end) else float(shape.start[-1])
-            _answer(self.poles, pieces, np.asarray(shape.amplitude, complex),
-                    np.asarray(shape.angular_frequency, float), last, s.start, s.height,
-                    samples.start, samples.step, y, force)
-        return np.vstack([y.real, y.imag, force])
-
-
-@njit(cache=True, nogil=True)
-def _within(lam, constant, slope, amplitude, omega, u):
-    """The answer of z' = lam z + F from rest, u s into one piece of a blow."""
-    e = np.exp(lam * u)
-    out = 0.0j
-    if abs(lam * u) < 1e-4:
-        x = lam * u
-        out += constant * u * (1.0 + x / 2.0 + x * x / 6.0)
-        out += slope * u * u * (0.5 + x / 6.0 + x * x / 24.0)
-    else:
-        out += constant * (e - 1.0) / lam
-        out += slope * (e - 1.0 - lam * u) / (lam * lam)
-    if amplitude != 0.0:
-        for c, mu in ((amplitude, 1j * omega), (np.conj(amplitude), -1j * omega)):
-            d = lam - mu
-            if abs(d * u) < 1e-6:
-                out += 0.5 * c * np.exp(mu * u) * u
-            else:
-                out += 0.5 * c * (e - np.exp(mu * u)) / d
-    return out
-
-
-@njit(cache=True, nogil=True)
-def _answer(poles, pieces, amplitude, omega, end, begin, height, start, step, out, force):
-    """Add the answer of each pole to one blow, and the blow's force, at the samples.
-
-    Args:
-        poles: (m,) 1/s.
-        pieces: (p, 3) start (s), constant (N), slope (N/s).
-        amplitude, omega: (p,) of a wave in each.
-        end: s, of the last piece.
-        begin, height: when the blow comes, and by what it is multiplied.
-        start, step: s, of the samples.
-        out: (m, count), added to.
-        force: (count,), added to.
-    """
-    count, p = force.size, pieces.shape[0]
-    first = max(int(np.ceil((max(begin, 0.0) - start) / step - 1e-9)), 0)
-    for i in range(poles.size):
-        lam = poles[i]
-        at = np.zeros(p + 1, dtype=np.complex128)
-        for j in range(p):
-            to = pieces[j + 1, 0] if j + 1 < p else end
-            span = to - pieces[j, 0]
-            at[j + 1] = at[j] * np.exp(lam * span) + _within(
-                lam, pieces[j, 1], pieces[j, 2], amplitude[j], omega[j], span
+            answer(
+                self.poles,
+                pieces,
+                np.asarray(shape.amplitude, complex),
+                np.asarray(shape.angular_frequency, float),
+                last,
+                s.start,
+                s.height,
+                samples.start,
+                samples.step,
+                y,
+                force,
             )
-        grown, z, tail = np.exp(lam * step), 0.0j, False
-        for k in range(first, count):
-            u = start + step * k - begin
-            if u >= end:
-                z = z * grown if tail else at[p] * np.exp(lam * (u - end))
-                tail = True
-            else:
-                j = p - 1
-                while j > 0 and pieces[j, 0] > u + 1e-12:
-                    j -= 1
-                v = max(u - pieces[j, 0], 0.0)
-                z = at[j] * np.exp(lam * v) + _within(
-                    lam, pieces[j, 1], pieces[j, 2], amplitude[j], omega[j], v
-                )
-            out[i, k] += height * z
-    for k in range(first, count):
-        u = start + step * k - begin
-        if u >= end:
-            break
-        j = p - 1
-        while j > 0 and pieces[j, 0] > u + 1e-12:
-            j -= 1
-        v = max(u - pieces[j, 0], 0.0)
-        wave = (amplitude[j] * np.exp(1j * omega[j] * v)).real
-        force[k] += height * (pieces[j, 1] + pieces[j, 2] * v + wave)
+        return np.vstack([y.real, y.imag, force])
 
 
 def _under(model: Model, more: Effect) -> Model:
@@ -769,7 +815,10 @@ def _swapped(model: Model, old: Effect, new: Effect) -> Model:
 
 
 def _whitened(
-    series: FloatArray, noise: AutoRegression, dead: BoolArray | None, free: bool,
+    series: FloatArray,
+    noise: AutoRegression,
+    dead: BoolArray | None,
+    free: bool,
     unknown: BoolArray | None,
 ) -> FloatArray:
     """(S, m) in units of the noise; 0 where nothing is known."""
@@ -778,14 +827,7 @@ def _whitened(
     if dead is not None:
         series = np.where(dead, 0.0, series)
     out = np.empty(series.shape)
-    _whiten_all(np.ascontiguousarray(series), *noise.filters, out)
+    whiten_all(np.ascontiguousarray(series), *noise.filters, out)
     if unknown is not None:
         out[:, unknown] = 0.0
     return out
-
-
-@njit(cache=True, nogil=True)
-def _whiten_all(series, predictors, deviation, out):
-    """`whiten` row by row."""
-    for i in range(series.shape[0]):
-        whiten(series[i], predictors, deviation, out[i])
