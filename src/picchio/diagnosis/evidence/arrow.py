@@ -125,6 +125,14 @@ def bounded(reduced: Reduced, low: FloatArray, high: FloatArray) -> FloatArray:
 
 
 def left_of(gram: FloatArray, step: FloatArray) -> float:
-    """Sum of squares of a record's residual after a step of (own, group, shared) numbers."""
+    """Sum of squares of a record's residual after a step of (own, group, shared) numbers.
+
+    Args:
+        gram: (k + 1, k + 1) products of its columns and residual.
+        step: (k,) of its numbers.
+
+    Returns:
+        the sum of squares.
+    """
     whole = np.append(-step, 1.0)
     return float(whole @ gram @ whole)

@@ -26,7 +26,11 @@ class Linear(Protocol):
     """A model linearised at a point."""
 
     def grams(self, residuals: Sequence[FloatArray]) -> list[FloatArray]:
-        """(k, k) of each record: products of its columns and of its residual, the last."""
+        """(k, k) of each record: products of its columns and of its residual, the last.
+
+        Args:
+            residuals: whitened, of each record.
+        """
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +67,9 @@ class Likelihood(Protocol):
 
         Args:
             at: the numbers.
+
+        Returns:
+            an array a record.
 
         Raises:
             InputError: no model there.
@@ -130,6 +137,9 @@ def objective(likelihood: Likelihood, at: Numbers, squares: FloatArray) -> Objec
         likelihood: of the records.
         at: the numbers.
         squares: (records,) sums of squares of the residuals.
+
+    Returns:
+        its value, and what is left of each group.
     """
     away = standardised(likelihood.prior, at)
     found = grouped(likelihood, squares)
@@ -143,7 +153,12 @@ def objective(likelihood: Likelihood, at: Numbers, squares: FloatArray) -> Objec
 
 
 def grouped(likelihood: Likelihood, squares: FloatArray) -> list[Any]:
-    """What is left of each group."""
+    """What is left of each group.
+
+    Args:
+        likelihood: of the records.
+        squares: (records,) sums of squares of the residuals.
+    """
     of = np.asarray(likelihood.group_of)
     sums = [
         np.bincount(of, np.asarray(v, float))
@@ -153,12 +168,26 @@ def grouped(likelihood: Likelihood, squares: FloatArray) -> list[Any]:
 
 
 def standardised(prior: Prior, at: Numbers) -> Numbers:
-    """Numbers in units of their prior."""
+    """Numbers in units of their prior.
+
+    Args:
+        prior: of all numbers.
+        at: the numbers.
+    """
     return (at + prior.mean.scaled(-1.0)) / prior.std
 
 
 def scaled(grams: Sequence[FloatArray], group_of: Sequence[int], std: Numbers) -> list[FloatArray]:
-    """Products of columns per standard deviation of the prior."""
+    """Products of columns per standard deviation of the prior.
+
+    Args:
+        grams: of each record, in units of the numbers.
+        group_of: of each record.
+        std: of the prior.
+
+    Returns:
+        the same products per standard deviation.
+    """
     out = []
     for record, gram in enumerate(grams):
         own = np.concatenate([std.records[record], std.groups[group_of[record]], std.shared, [1.0]])
@@ -167,14 +196,25 @@ def scaled(grams: Sequence[FloatArray], group_of: Sequence[int], std: Numbers) -
 
 
 def squares_of(residuals: Sequence[FloatArray]) -> FloatArray:
-    """(records,) sums of squares."""
+    """(records,) sums of squares.
+
+    Args:
+        residuals: of each record.
+    """
     return np.array([float(np.vdot(rows, rows)) for rows in residuals])
 
 
 def promised(
     likelihood: Likelihood, grams: Sequence[FloatArray], at: Numbers, step: Numbers
 ) -> FloatArray:
-    """(records,) what a step leaves by the slopes, numbers in units of their prior."""
+    """(records,) what a step leaves by the slopes, numbers in units of their prior.
+
+    Args:
+        likelihood: of the records.
+        grams: in units of the prior.
+        at: where the numbers are.
+        step: in units of the prior.
+    """
     found = []
     for record, gram in enumerate(grams):
         own = np.concatenate(
@@ -298,7 +338,16 @@ def settled(
     linear: Any,
     used: int,
 ) -> Fit:
-    """A fit at its numbers: evidence and covariance."""
+    """A fit at its numbers: evidence and covariance.
+
+    Args:
+        likelihood: of the records.
+        at: the numbers.
+        residuals: there.
+        now: the objective there.
+        linear: slopes near there.
+        used: how often slopes were taken.
+    """
     prior = likelihood.prior
     grams = scaled(linear.grams(residuals), likelihood.group_of, prior.std)
     system = reduce(grams, likelihood.group_of, now.weights, standardised(prior, at))

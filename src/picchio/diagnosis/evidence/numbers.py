@@ -33,7 +33,11 @@ class Numbers:
         return self._with(other, np.divide)
 
     def scaled(self, factor: float) -> Numbers:
-        """All of them times a factor."""
+        """All of them times a factor.
+
+        Args:
+            factor: of all.
+        """
         return Numbers(
             factor * self.shared,
             tuple(factor * own for own in self.groups),

@@ -30,6 +30,9 @@ class Table:
 
         Args:
             fit: of a set of causes.
+
+        Returns:
+            nats.
         """
         return fit.evidence - math.log(max(self.candidates, 1)) * len(labels_of(fit)) - fit.penalty
 
@@ -50,7 +53,11 @@ class Table:
         return max(self.fits.values(), key=self.score)
 
     def weights(self) -> dict[Labels, float]:
-        """Posterior probability of each set among all that were fitted."""
+        """Posterior probability of each set among all that were fitted.
+
+        Returns:
+            by the labels of the set.
+        """
         scores = {key: self.score(fit) for key, fit in self.fits.items()}
         total = float(np.logaddexp.reduce(list(scores.values())))
         return {key: math.exp(score - total) for key, score in scores.items()}
@@ -60,6 +67,9 @@ class Table:
 
         Args:
             within: nats.
+
+        Returns:
+            labels and fit of each.
         """
         best = self.best
         own, score = labels_of(best), self.score(best)
@@ -68,7 +78,11 @@ class Table:
                 yield key, fit
 
     def odds(self) -> float:
-        """Log odds of any cause at all against none, nats."""
+        """Log odds of any cause at all against none, nats.
+
+        Returns:
+            minus infinity where no set has a cause.
+        """
         some = [self.score(fit) for key, fit in self.fits.items() if key]
         if not some:
             return -math.inf
@@ -80,5 +94,8 @@ def labels_of(fit: Fit) -> Labels:
 
     Args:
         fit: of a set of causes.
+
+    Returns:
+        a set of effect:target.
     """
     return frozenset(cause.label for cause in fit.likelihood.causes)

@@ -43,6 +43,9 @@ def left_by(fit: Fit) -> float:
 
     Args:
         fit: of a set of causes.
+
+    Returns:
+        1 is as much as was measured.
     """
     return float(np.sqrt(np.mean(fit.objective.sizes**2)))
 

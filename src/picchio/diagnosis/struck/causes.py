@@ -47,13 +47,21 @@ class EffectNumber:
     mean: float = 0.0
 
     def value(self, u: float) -> float:
-        """The parameter at a coordinate, SI."""
+        """The parameter at a coordinate, SI.
+
+        Args:
+            u: the coordinate.
+        """
         if self.kind in ("log", "relaxation"):
             return self.origin * math.exp(u)
         return self.scale / u if self.kind == "inverse" else self.origin + self.scale * u
 
     def coordinate(self, value: float) -> float:
-        """The coordinate of a value, SI."""
+        """The coordinate of a value, SI.
+
+        Args:
+            value: SI.
+        """
         if self.kind in ("log", "relaxation"):
             return math.log(value / self.origin)
         if self.kind == "inverse":
@@ -61,7 +69,11 @@ class EffectNumber:
         return (value - self.origin) / self.scale
 
     def slope(self, u: float) -> float:
-        """Of the value by the coordinate."""
+        """Of the value by the coordinate.
+
+        Args:
+            u: the coordinate.
+        """
         if self.kind == "log":
             return self.value(u)
         return -self.scale / u**2 if self.kind == "inverse" else self.scale
@@ -85,7 +97,11 @@ class Cause:
         return self.effect.label
 
     def at(self, u: Sequence[float]) -> Effect:
-        """The effect at coordinates."""
+        """The effect at coordinates.
+
+        Args:
+            u: a coordinate of each number.
+        """
         values = {n.parameter: n.value(float(x)) for n, x in zip(self.numbers, u, strict=True)}
         for n in self.numbers:
             if n.kind == "relaxation":
@@ -93,7 +109,11 @@ class Cause:
         return self.effect.bounded(**values)
 
     def coordinates(self, effect: Effect) -> list[float]:
-        """The coordinates of an effect's values, within their bounds."""
+        """The coordinates of an effect's values, within their bounds.
+
+        Args:
+            effect: with values.
+        """
         found = []
         for n in self.numbers:
             value = effect.values[n.parameter]
@@ -109,7 +129,11 @@ class Cause:
         return found
 
     def partly(self, share: float) -> Effect:
-        """The effect with so much of its amount."""
+        """The effect with so much of its amount.
+
+        Args:
+            share: of the amount at which it is tried.
+        """
         u = [
             x * share if n.amount else x
             for n, x in zip(self.numbers, self.coordinates(self.effect), strict=True)
@@ -183,7 +207,14 @@ def _number(
 def candidate_starts(
     kind: type[Effect], target: str, scales: Scales, tolerance: Tolerance
 ) -> list[Cause]:
-    """A candidate at every size at which it is tried."""
+    """A candidate at every size at which it is tried.
+
+    Args:
+        kind: of effect.
+        target: where it may be at work.
+        scales: of what size it is tried.
+        tolerance: of the campaign.
+    """
     trials = kind(target).trials(scales)
     out = []
     for t in trials:

@@ -51,7 +51,11 @@ class Data:
 
     @classmethod
     def of(cls, problem: Problem) -> Data:
-        """From a problem."""
+        """From a problem.
+
+        Args:
+            problem: robot, records and noise.
+        """
         old = Old.nominal(problem)
         tolerance = problem.campaign.tolerance
         base = []
@@ -102,7 +106,11 @@ class Data:
         return every if self.chosen is None else [every[k] for k in self.chosen]
 
     def only(self, chosen: Sequence[int]) -> Data:
-        """Some of the records."""
+        """Some of the records.
+
+        Args:
+            chosen: which records.
+        """
         return replace(self, chosen=tuple(chosen), own=tuple(self.own[k] for k in chosen))
 
 
@@ -159,7 +167,11 @@ class Percussion:
         return frozenset(c.label for c in self.causes)
 
     def own(self, k: int) -> list[Own]:
-        """A record's own numbers, each with the blow or the place that it belongs to, or -1."""
+        """A record's own numbers, each with the blow or the place that it belongs to, or -1.
+
+        Args:
+            k: which record.
+        """
         found: list[Own] = [o for o in self.data.own[k] if o[0].means not in self._labels]
         for cause in self.causes:
             latent = cause.effect.latent
@@ -238,7 +250,12 @@ class Percussion:
         return out
 
     def start(self, at: Numbers | None = None, like: Percussion | None = None) -> Numbers:
-        """Numbers to begin at: another hypothesis' where they are the same, causes as tried."""
+        """Numbers to begin at: another hypothesis' where they are the same, causes as tried.
+
+        Args:
+            at: numbers of the other hypothesis; None for the stated ones.
+            like: the other hypothesis.
+        """
         known = {}
         if at is not None and like is not None:
             known = dict(zip(like.names, at.shared, strict=True))
@@ -269,7 +286,14 @@ class Percussion:
 
     # The model at a point ----------------------------------------------------------------------
     def effects_at(self, at: Numbers) -> tuple[Effect, ...]:
-        """Effects of the files' values and of the causes."""
+        """Effects of the files' values and of the causes.
+
+        Args:
+            at: the numbers.
+
+        Returns:
+            in the order of the causes.
+        """
         out, k = [], 0
         for c in (*self._base(), *self.causes):
             m = len(c.numbers)
@@ -297,7 +321,12 @@ class Percussion:
         return found
 
     def moved(self, record: int, at: Numbers) -> list[tuple[Inexact, FloatArray]]:
-        """What is moved in a record, by how many standard deviations."""
+        """What is moved in a record, by how many standard deviations.
+
+        Args:
+            record: which.
+            at: the numbers.
+        """
         if self.light:
             return []
         k = len(self.effect_numbers)
@@ -321,13 +350,22 @@ class Percussion:
     def there(
         self, record: int, at: Numbers, effects: Sequence[Effect]
     ) -> tuple[MeasuredRecord, Model]:
-        """A record with its pose moved, and the model with everything in it."""
+        """A record with its pose moved, and the model with everything in it.
+
+        Args:
+            record: which.
+            at: the numbers.
+            effects: at these numbers.
+        """
         own = self.data.records[record]
         moved, more = nudged(own, self.moved(record, at))
         return moved, self.data.problem.model.with_effects((*effects, *more))
 
     def residuals(self, at: Numbers) -> list[FloatArray]:
         """Whitened (channels, m) of each record.
+
+        Args:
+            at: the numbers.
 
         Raises:
             InputError: no model there.
@@ -340,7 +378,16 @@ class Percussion:
         return out
 
     def residual(self, k: int, record: MeasuredRecord, model: Model) -> FloatArray:
-        """Of one record under a model."""
+        """Of one record under a model.
+
+        Args:
+            k: which record.
+            record: with its pose moved.
+            model: with everything in it.
+
+        Raises:
+            InputError: no model there, or one whose motion diverges.
+        """
         try:
             with np.errstate(all="ignore"):
                 rows = residual(record, model, self.end, lambda: self.edges[k])
@@ -351,7 +398,11 @@ class Percussion:
         return rows
 
     def some(self, at: Numbers) -> tuple[Percussion, Numbers]:
-        """One record a pose, each of another direction, and their numbers."""
+        """One record a pose, each of another direction, and their numbers.
+
+        Args:
+            at: the numbers of all.
+        """
         by_pose: dict[int, list[int]] = {}
         for k, pose in enumerate(self.group_of):
             by_pose.setdefault(pose, []).append(k)
@@ -363,11 +414,19 @@ class Percussion:
         )
 
     def about(self, at: Numbers) -> Percussion:
-        """The same with the samples left out that are near edges there."""
+        """The same with the samples left out that are near edges there.
+
+        Args:
+            at: the numbers.
+        """
         return replace(self, edges=self._edges(self.effects_at(at)))
 
     def linearised(self, at: Numbers) -> Slopes:
-        """The slopes there."""
+        """The slopes there.
+
+        Args:
+            at: the numbers.
+        """
         from picchio.diagnosis.struck.slopes import Slopes
 
         return Slopes.of(self, at)

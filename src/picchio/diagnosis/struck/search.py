@@ -148,7 +148,14 @@ class Search:
     # Steps ---------------------------------------------------------------------------------------
 
     def near(self, fit: Fit) -> list[Fit]:
-        """Fits with one more cause, by what slopes promise."""
+        """Fits with one more cause, by what slopes promise.
+
+        Args:
+            fit: about which.
+
+        Returns:
+            those that could be fitted.
+        """
         last = max(r.setup.samples.last for r in self.data.records)
         promises = screen(fit, self.starts, min(0.6, last), self.price)
         _log.debug("promised: %s", ", ".join(f"{p.label} {p.gain:.0f}" for p in promises[:8]))
@@ -160,7 +167,14 @@ class Search:
         return self._all(((*causes, cause), fit, (None,)) for cause in chosen)
 
     def far(self, fit: Fit) -> list[Fit]:
-        """Fits with one more cause from the stated numbers, where those of the fit are strained."""
+        """Fits with one more cause from the stated numbers, where those of the fit are strained.
+
+        Args:
+            fit: that is strained.
+
+        Returns:
+            those that could be fitted.
+        """
         causes = self.causes_of(fit)
         have = {cause.label for cause in causes}
         end = WINDOWS[0]
@@ -260,7 +274,11 @@ class Search:
         return found
 
     def run(self) -> Judged:
-        """The verdict."""
+        """The verdict.
+
+        Raises:
+            InputError: no model at the stated values.
+        """
         now = self.fit((), windows=WINDOWS)
         if now is None:
             raise InputError("no model that can be computed at the stated values")

@@ -73,7 +73,14 @@ class Change:
     def between(
         cls, before: VibratingSystem, after: VibratingSystem, size: float, seen: bool = False
     ) -> Change:
-        """Of two systems with the same coordinates, `size` apart."""
+        """Of two systems with the same coordinates, `size` apart.
+
+        Args:
+            before: a system.
+            after: another.
+            size: how far the number was moved.
+            seen: whether sensors see the change, too.
+        """
         return cls(
             (after.mass - before.mass) / size,
             (after.stiffness - before.stiffness) / size,
@@ -144,7 +151,14 @@ class RecordSlopes:
     products: FloatArray = field(default_factory=lambda: np.zeros(0), repr=False)
 
     def gram(self, residual: FloatArray) -> FloatArray:
-        """(numbers + 1, numbers + 1) products of all columns and the residual (channels, m)."""
+        """(numbers + 1, numbers + 1) products of all columns and the residual (channels, m).
+
+        Args:
+            residual: whitened.
+
+        Returns:
+            symmetric.
+        """
         n = self.index.size
         out = np.empty((n + 1, n + 1))
         out[:n, :n] = self.products_of_columns
@@ -177,7 +191,11 @@ class RecordSlopes:
         return both[np.ix_(self.index, self.index)]
 
     def column(self, number: int) -> FloatArray:
-        """(channels, m) the slope by one number."""
+        """(channels, m) the slope by one number.
+
+        Args:
+            number: its place.
+        """
         place, count = int(self.index[number]), self.families[0].weights.shape[0]
         if place >= count:
             return np.asarray(self.explicit[place - count])
@@ -195,12 +213,22 @@ class Slopes:
     records: tuple[RecordSlopes, ...]
 
     def grams(self, residuals: Sequence[FloatArray]) -> list[FloatArray]:
-        """(k, k) of each record: own, group's, shared numbers, residual."""
+        """(k, k) of each record: own, group's, shared numbers, residual.
+
+        Args:
+            residuals: whitened, of each record.
+        """
         return [one.gram(rows) for one, rows in zip(self.records, residuals, strict=True)]
 
     @classmethod
     def of(cls, of: Percussion, at: Numbers, candidates: Sequence[Candidate] = ()) -> Slopes:
-        """At a point; last among the shared numbers those of candidates."""
+        """At a point; last among the shared numbers those of candidates.
+
+        Args:
+            of: the records under a hypothesis.
+            at: the numbers.
+            candidates: effects that are not in it.
+        """
         by_pose: dict[int, list[int]] = {}
         for k, pose in enumerate(of.group_of):
             by_pose.setdefault(pose, []).append(k)

@@ -35,9 +35,18 @@ def _within(lam, constant, slope, amplitude, omega, u):
 def answer(poles, pieces, amplitude, omega, end, begin, height, start, step, out, force):
     """Add the answer of each pole to one blow, and the blow's force, at the samples.
 
-    Pieces (p, 3) have start (s), constant (N) and slope (N/s); amplitude and omega (p,) are those
-    of a wave in each; the last ends at `end`. The blow comes at `begin`, times `height`. Added to
-    are out (m, count) and force (count,).
+    Args:
+        poles: (m,) 1/s.
+        pieces: (p, 3) start, s, constant, N, and slope, N/s.
+        amplitude: (p,) of a wave in each, N.
+        omega: (p,) rad/s.
+        end: s, of the last piece.
+        begin: s, when the blow comes.
+        height: by what it is multiplied.
+        start: s, of the samples.
+        step: s, between them.
+        out: (m, count), added to.
+        force: (count,), added to.
     """
     count, p = force.size, pieces.shape[0]
     first = max(int(np.ceil((max(begin, 0.0) - start) / step - 1e-9)), 0)
@@ -79,6 +88,13 @@ def answer(poles, pieces, amplitude, omega, end, begin, height, start, step, out
 
 @njit(cache=True, nogil=True)
 def whiten_all(series, predictors, deviation, out):
-    """`whiten` row by row."""
+    """`whiten` row by row.
+
+    Args:
+        series: (k, m).
+        predictors: as in `whiten`.
+        deviation: as in `whiten`.
+        out: (k, m), where it goes.
+    """
     for i in range(series.shape[0]):
         whiten(series[i], predictors, deviation, out[i])
