@@ -40,7 +40,7 @@ REFERENCE = {
 }
 NOT_BUILT = "commands, file formats, effects, Python: in the site that `python docs/build.py` makes"
 PARTS = {
-    "Start": ("readme", "gallery"),
+    "Start": ("Install and run <readme>", "gallery"),
     "Tutorials": ("tutorial/assess", "tutorial/own_robot", "tutorial/diagnose"),
     "How to": tuple(
         f"how_to/{name}"

@@ -49,7 +49,11 @@ def follow(page: Path) -> None:
     [
         pytest.param("tutorial/assess", ("life.html", "scene.html"), marks=pytest.mark.slow),
         pytest.param("tutorial/own_robot", ("loads/sheet.html",), marks=pytest.mark.slow),
-        pytest.param("tutorial/diagnose", ("why.html", "flex.toml"), marks=pytest.mark.slow),
+        pytest.param(
+            "tutorial/diagnose",
+            ("why.html", "flex.toml"),
+            marks=(pytest.mark.slow, pytest.mark.minutes, pytest.mark.timeout(1500)),
+        ),
         ("how_to/count", ("life.html", "cell.ledger")),
         ("how_to/python", ()),
         pytest.param("how_to/report", ("report.html", "life.csv"), marks=pytest.mark.slow),
