@@ -193,13 +193,12 @@ def gallery_page() -> str:
         title = title.removesuffix(".")
         picture = f"images/gallery/{path.stem}.png"
         draw(path, SOURCE / picture)
-        cells.append(f"[![{title}]({picture})](#{path.stem})")
+        cells.append(f'[![{title}]({picture}){{width="32%"}}](#{path.stem})')
         code = code.partition('"""\n')[2].strip()
         sections += [f"({path.stem})=", f"## {title}\n", f"{detail.strip()}\n"]
         sections += [f"![{title}]({picture})\n", f"```python\n{code}\n```\n"]
-    rows = [f"| {' | '.join(cells[k : k + 4])} |" for k in range(0, len(cells), 4)]
     lines = ["# Gallery\n", "Each example is complete: copy it and run it.\n"]
-    return "\n".join([*lines, "| | | | |", "|---|---|---|---|", *rows, "", *sections])
+    return "\n".join([*lines, *cells, "", *sections])
 
 
 def commands_page() -> str:

@@ -29,7 +29,7 @@ html_copy_source = False
 smartquotes = False
 
 nb_execution_mode = "off"  # the tests execute the notebooks
-myst_enable_extensions = ["dollarmath"]
+myst_enable_extensions = ["dollarmath", "attrs_inline"]
 myst_heading_anchors = 3
 
 autodoc_member_order = "bysource"
