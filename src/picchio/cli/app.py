@@ -2,17 +2,65 @@
 
 from __future__ import annotations
 
+import functools
+import inspect
+import re
+import textwrap
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from typer.core import TyperCommand
 
+from picchio.cli.output import show_all
 from picchio.core.guard import guard
+
+# Groups of options in a command's help.
+ROBOT, BLOWS, OUTPUT = "The robot", "The blows", "What is written and printed"
+
+
+def examples(*commands: str) -> str:
+    """The end of a command's help.
+
+    Args:
+        *commands: what may be typed, without the program's name.
+    """
+    return "\n".join(f"picchio {command}" for command in commands)
 
 
 class _Command(TyperCommand):
-    """A subcommand: its outputs are compared with what it is told to read, before any work."""
+    """A subcommand: its outputs are compared with what it is told to read, before any work.
+
+    Its help tells the options that the examples use first, the others by what they are about.
+    """
+
+    def format_options(self, context: Any, formatter: Any) -> None:
+        """Arguments, the options of the examples, then the others in groups."""
+        used = set(re.findall(r"(?<= )--?[a-z][a-z-]*", self.epilog or ""))
+        titles = ("Arguments", "Options used most", "More options")
+        groups: dict[str, list[Any]] = {title: [] for title in titles}
+        for param in self.get_params(context):
+            record = param.get_help_record(context)
+            if record is None:
+                continue
+            named = getattr(param, "rich_help_panel", None) or "More options"
+            first = "Options used most" if used & {*param.opts} or param.required else named
+            title = "Arguments" if param.param_type_name == "argument" else first
+            groups.setdefault(title, []).append(record)
+        for title, records in groups.items():
+            if records:
+                with formatter.section(title):
+                    formatter.write_dl(records)
+
+    def format_epilog(self, context: Any, formatter: Any) -> None:
+        """The examples, a line each."""
+        with formatter.section("Examples"):
+            for line in (self.epilog or "").splitlines():
+                formatter.write(textwrap.fill(
+                    line, formatter.width, initial_indent="  ", subsequent_indent="      ",
+                    break_on_hyphens=False, break_long_words=False,
+                ) + "\n")  # fmt: skip
 
     def make_context(self, *arguments: Any, **options: Any) -> Any:
         guard.begin()
@@ -29,9 +77,35 @@ class _Command(TyperCommand):
         return super().invoke(context)
 
 
+_VERBOSE = Annotated[
+    bool,
+    typer.Option("-v", "--verbose", help="Print all there is to say, not what fits 25 lines.",
+                 rich_help_panel=OUTPUT),
+]  # fmt: skip
+
+
 class _App(typer.Typer):
     def command(self, name: str | None = None, **options: Any) -> Any:
-        return super().command(name, **{"cls": _Command} | options)
+        """Every command takes `-v`."""
+        register = super().command(name, **{"cls": _Command} | options)
+
+        def added(function: Callable[..., Any]) -> Callable[..., Any]:
+            @functools.wraps(function)
+            def told(*, verbose: bool, **given: Any) -> Any:
+                show_all(verbose)
+                return function(**given)
+
+            own = inspect.signature(function, eval_str=True)
+            more = inspect.Parameter("verbose", inspect.Parameter.KEYWORD_ONLY, default=False,
+                                     annotation=_VERBOSE)  # fmt: skip
+            told.__signature__ = own.replace(parameters=[*own.parameters.values(), more])  # type: ignore[attr-defined]
+            told.__annotations__ = {
+                p.name: p.annotation for p in told.__signature__.parameters.values()
+            }  # type: ignore[attr-defined]
+            register(told)
+            return function
+
+        return added
 
 
 app = _App(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from textwrap import wrap
 from typing import TYPE_CHECKING, Literal
 
@@ -76,6 +76,29 @@ class FittedTable:
         """The columns, measured."""
         cells = [[row.cells[k] for row in self.rows] for k in range(len(self.heads))]
         return [Column.of(head, cells[k], k == 0) for k, head in enumerate(self.heads)]
+
+    def brief(self, console: Console, lines: int) -> tuple[FittedTable, bool]:
+        """What of the table fits: the first columns and rows, and whether that is not all.
+
+        Args:
+            console: where it is printed.
+            lines: that there are.
+        """
+        columns, kept = self.columns(), 1
+        left = console.width - columns[0].needed
+        while kept < len(columns) and (left := left - columns[kept].needed - _GAP) >= 0:
+            kept += 1
+
+        def of(count: int) -> FittedTable:
+            rows = [Row(row.cells[:kept], row.style) for row in self.rows[:count]]
+            rest = len(self.rows) - count
+            more = f"... and {rest} more" if rest else self.caption
+            return replace(self, heads=self.heads[:kept], rows=rows, caption=more)
+
+        made = of(count := len(self.rows))
+        while count > 1 and len(console.render_lines(made, pad=False)) - (not made.caption) > lines:
+            made = of(count := max(1, count - max(1, count // 8)))
+        return made, kept < len(columns) or count < len(self.rows)
 
     def __rich_console__(
         self, console: Console, options: ConsoleOptions

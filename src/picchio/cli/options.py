@@ -135,10 +135,11 @@ JsonOption = Annotated[
     typer.Option(metavar="FILE", help="Write the result as JSON; - for stdout.", parser=_json),
 ]
 GravityStiffnessOption = Annotated[
-    bool,
+    bool | None,
     typer.Option(
         "--gravity-stiffness/--no-gravity-stiffness",
-        help="Whether gravity's stiffness dg/dq is added to that of the springs.",
+        help="Whether gravity's stiffness dg/dq is added to that of the springs; of a saved model "
+        "what its fit assumed.",
     ),
 ]
 

@@ -28,7 +28,9 @@ if TYPE_CHECKING:
 
     from picchio.core.results import Result
 
-_NO_END = 10_000  # characters
+_PIPE = 10_000  # characters: no line wraps there
+_LINES = 25  # of an answer on a screen, unless all is asked for
+_MORE = "To know more: -v"
 # ASCII's and Latin-1's, marks that turn the direction of writing, halves of characters.
 _CONTROL = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u2066-\u2069\ud800-\udfff]"
@@ -37,6 +39,10 @@ _INDENT = re.compile(r" +(- )?")
 _typed: list[str] = []
 _said: list[str] = []
 _awaited: dict[Path, tuple[int, ...] | None] = {}
+# What an answer prints, held until it is known what of it fits; None begins the details.
+_Held = tuple[tuple[Any, ...], dict[str, Any]]
+_held: list[_Held | None] | None = None
+_all = False
 
 
 def begin(arguments: Sequence[str]) -> None:
@@ -44,6 +50,28 @@ def begin(arguments: Sequence[str]) -> None:
     _typed[:] = arguments
     _said.clear()
     _awaited.clear()
+    show_all(False)
+
+
+def show_all(wanted: bool) -> None:
+    """Whether answers are printed whole (`-v`), not what fits 25 lines.
+
+    Args:
+        wanted: by the user.
+    """
+    global _all
+    _all = wanted
+
+
+def whole() -> bool:
+    """Whether answers are printed whole."""
+    return _all
+
+
+def details() -> None:
+    """What is printed from here on is for those who ask for more."""
+    if _held is not None:
+        _held.append(None)
 
 
 def say_warning(message: str) -> None:
@@ -79,11 +107,14 @@ def console() -> Console:
             return super().render_str(printable(text), **options)
 
         def print(self, *objects: Any, **options: Any) -> None:
-            """What wraps of an indented line is indented, too."""
-            super().print(*(_hanging(o, self.width) for o in objects), **options)
+            """What wraps of an indented line is indented, too; an answer is held."""
+            if _held is None:
+                super().print(*(_hanging(o, self.width) for o in objects), **options)
+            else:
+                _held.append((objects, options))
 
     known = sys.stdout.isatty() or os.environ.get("COLUMNS", "").isdigit()
-    width = None if known else _NO_END
+    width = None if known else _PIPE
     return Plain(width=width, markup=False, emoji=False, highlight=False)
 
 
@@ -254,7 +285,42 @@ def deliver(
             return
         with atomic_write(target) as stream:
             stream.writelines(pieces)
-    show()
+    _answer(show)
+
+
+def _answer(show: Callable[[], object]) -> None:
+    """Print an answer, of which the most important comes first: all, or what fits 25 lines."""
+    global _held
+    if _all:
+        show()
+        return
+    held = _held = []
+    try:
+        show()
+    finally:
+        _held = None
+    screen, lines, cut = console(), [], False
+    for entry in held:
+        room = _LINES - 1 - len(lines)
+        if entry is None or room < 1:
+            cut = True
+            break
+        (first, *rest), options = entry[0] or ("",), entry[1]
+        if isinstance(first, FittedTable):
+            first, less = first.brief(screen, room)
+            cut |= less
+        with screen.capture() as text:
+            screen.print(first, *rest, **options)
+        made = text.get().splitlines()
+        if len(made) > room + (not made[-1].strip()):
+            cut = True
+            break
+        lines += made[:room]
+    if cut:
+        while lines and not lines[-1].strip():
+            lines.pop()
+        lines.append(_MORE)
+    sys.stdout.write("".join(f"{line}\n" for line in lines))
 
 
 # What follows the steps of a command.

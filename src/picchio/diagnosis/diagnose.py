@@ -49,7 +49,7 @@ def diagnose(
     without: Collection[str] = (),
     flex: str | Path | None = None,
     tool: str | None = None,
-    gravity_stiffness: bool = True,
+    gravity_stiffness: bool | None = None,
     workers: int | None = None,
     train: Collection[str] = (),
     held_out: Collection[str] = (),
@@ -67,7 +67,8 @@ def diagnose(
         without: names of effects that must not be considered.
         flex: sidecar of the robot.
         tool: the frame that carries the tool.
-        gravity_stiffness: whether gravity's stiffness dg/dq counts beside the springs'.
+        gravity_stiffness: whether gravity's stiffness dg/dq counts beside the springs'; on if not
+            given, unless a saved model says otherwise.
         workers: processes for percussion records (Linux only); as many as cores if None. The
             result is the same.
         train: names of motion records to fit to; chosen by how the joints move if not given.
@@ -90,6 +91,7 @@ def diagnose(
                          "out", key="train" if train else "held_out")  # fmt: skip
     # What a drive's torque tells needs no stiffness.
     loaded = load_robot(robot, flex=flex, tool=tool, allow_rigid=kinds == {"motion"})
+    gravity_stiffness = loaded.adds_gravity(gravity_stiffness, usual=True)
     work: Task | None = None
     if task is not None:  # what is wrong with it is told now, not minutes later
         work = task if isinstance(task, Task) else load_task(task, loaded)
@@ -141,6 +143,7 @@ def diagnose(
     tables = [e.to_dict() for e in effects if e.values != type(e)(e.target).values or e.hidden]
     saved = {
         **_named(robot, loaded, flex, tool), "effects": tables, "notes": notes,
+        "gravity_stiffness": None if kinds == {"motion"} else gravity_stiffness,
         "provenance": {"picchio": str(stamp["picchio"])},
     }  # fmt: skip
     return replace(

@@ -10,10 +10,12 @@ from typing import Any, Literal
 
 import numpy as np
 
+from picchio.core import spoken
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.core.results import Result
 from picchio.model.effects.effect import Effect
+from picchio.model.effects.registry import effect_class
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.loading.saved_model import saved_model_text
@@ -43,11 +45,11 @@ _SCATTER = 0.01
 
 Verdict = Literal["nothing-wrong", "named", "ambiguous", "partial", "unexplained"]
 VERDICTS: dict[str, str] = {
-    "nothing-wrong": "the residual is noise and what the tolerances allow",
-    "named": "the causes explain the records; what is left is noise, or little more",
+    "nothing-wrong": "the model agrees with the records within noise and tolerances",
+    "named": "the cause is found; no more than noise, or little more, is unexplained",
     "ambiguous": "several sets of causes explain the records; these data cannot tell them apart",
-    "partial": "the causes, or what acts much like them, explain most; more than noise is left",
-    "unexplained": "more than noise is left and no cause may be claimed",
+    "partial": "most is explained by these causes, or by what acts much like them; not all",
+    "unexplained": "the model is wrong, and no cause can be claimed",
 }
 
 
@@ -94,6 +96,33 @@ class Cause:
     confidence: float
     parameters: Mapping[str, Value] = field(default_factory=dict)
     tolerances: float | None = None
+
+    def told(self, model: Model | None) -> str:
+        """The cause with its values, such as "payload of tool: mass 2.1 kg".
+
+        Args:
+            model: that has it; what is stated of its robot is held against the value.
+        """
+        what = effect_class(self.effect).sidecar
+        joint = next((j for j in model.robot.flexible_joints if j.name == self.target), None) \
+            if model else None  # fmt: skip
+        scale, stated = self.parameters.get("scale"), getattr(joint, what or "", None)
+        if scale is not None and isinstance(stated, float):
+            ways = ("softer", "stiffer") if what == "stiffness" else ("lower", "higher")
+            part = "" if what == "stiffness" else f"{what.replace('_', ' ')} of "
+            unit = joint.units.of("N m/rad") if what == "stiffness" and joint else ""
+            size = spoken.number(100.0 * abs(scale.value - 1.0), 2)
+            return (
+                f"{part}{self.target} is {size} % {ways[scale.value > 1.0]} than stated "
+                f"({spoken.number(scale.value * stated)} instead of {spoken.number(stated)} {unit})"
+            ).replace(" )", ")")
+        values = (
+            f"{name.replace('_', ' ')} {spoken.number(v.value)}"
+            + ("" if v.unit == "1" else f" {v.unit.replace('*', ' ')}")
+            for name, v in self.parameters.items()
+        )
+        named = f"{self.effect.replace('_', ' ')} of {self.target}"
+        return ": ".join(filter(None, (named, ", ".join(values))))
 
     def to_dict(self) -> dict[str, Any]:
         """As in JSON."""
@@ -347,6 +376,17 @@ class Diagnosis(Result):
             f"No value is from {', '.join(self.untold)}: errors of a tolerance or less grow too "
             "large there. What was found explains them all the same"
         )
+
+    @property
+    def answer(self) -> str:
+        """The verdict as sentences, causes with their values first."""
+        text = self.note or VERDICTS[self.verdict]
+        if not self.causes:
+            return f"{self.verdict.replace('-', ' ').capitalize()}: {text}"
+        causes = "; ".join(cause.told(self.model) for cause in self.causes[:_SHOWN])
+        rest = len(self.causes) - _SHOWN
+        head = f"Cause{'s' * (len(self.causes) > 1)} found: {causes}"
+        return f"{head}{f' and {rest} more' if rest > 0 else ''} ({self.verdict}: {text})"
 
     def model_text(self, folder: Path | None = None) -> str:
         """The extended model as a `picchio-model/1` file.

@@ -95,19 +95,3 @@ def life(damage_per_unit: float) -> float:
     if value < 0:
         raise InputError("must not be negative", key="damage", value=damage_per_unit)
     return math.inf if value == 0 else float(np.divide(1.0, value))
-
-
-def format_count(value: float) -> str:
-    """A number of rivets as people read it; "no end" for infinity.
-
-    Args:
-        value: the number; NaN is a dash.
-    """
-    if math.isnan(value):
-        return "-"
-    if math.isinf(value):
-        return "no end"
-    if value < 10:
-        return f"{value:.3g}"
-    # Four digits are more than the physics deserves.
-    return f"{float(f'{value:.4g}'):,.0f}" if value < 1e12 else f"{value:.3e}"

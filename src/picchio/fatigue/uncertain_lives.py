@@ -12,9 +12,9 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from picchio.core import spoken
 from picchio.core.arrays import FloatArray, as_floats
 from picchio.core.errors import InputError
-from picchio.fatigue.miner import format_count
 
 Shape = Literal["normal", "lognormal", "uniform", "absolute"]
 QUANTILES = {"p10": 0.1, "p50": 0.5, "p90": 0.9}
@@ -114,7 +114,7 @@ class LifeSpread:
     @property
     def told(self) -> str:
         """The life as an interval in words: from P10 to P90, about the median."""
-        p10, p50, p90 = (format_count(self.rounded(name)) for name in QUANTILES)
+        p10, p50, p90 = (spoken.count(self.rounded(name)) for name in QUANTILES)
         if p10 == p90:
             return p50
         return f"{p10} to {p90} (median {p50})"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -11,9 +11,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from picchio.core import spoken
 from picchio.core.arrays import FloatArray
 from picchio.core.results import TableResult
-from picchio.fatigue.miner import format_count
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.ledger.counted import HOUR, Counted
 from picchio.ledger.forecast import Worlds, quantiles
@@ -24,39 +24,6 @@ from picchio.model.model import Model
 SECONDS_A_DAY = 86_400
 _LATELY = 28  # days that today's pace is taken from
 _STATIONS = 12
-_MANY, _LITTLE = 1e12, 1e-8  # blows and share of a life: beyond these nobody needs the number
-
-
-def told_share(value: float, digits: int = 3) -> str:
-    """A share of a life, %, for people; "-" of none.
-
-    Args:
-        value: 1 is all of it.
-        digits: that are told.
-    """
-    if math.isnan(value):
-        return "-"
-    return f"{100 * value:.{digits}g}" if value > _LITTLE or not value else f"< {100 * _LITTLE:g}"
-
-
-def told_interval(interval: Sequence[float] | None, digits: int = 3) -> str:
-    """The same of an interval.
-
-    Args:
-        interval: low and high, or None.
-        digits: that are told.
-    """
-    ends = [told_share(value, digits) for value in interval or (math.nan,)]
-    return " to ".join(dict.fromkeys(ends))
-
-
-def told_blows(value: float) -> str:
-    """A number of blows, for people.
-
-    Args:
-        value: inf is "no end".
-    """
-    return f"> {_MANY:.0e}".replace("+", "") if _MANY < value < math.inf else format_count(value)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -201,7 +168,7 @@ class Count(TableResult):
             return None
         date = self.dates(left)["p50"]
         if self.blows_a_day is None:
-            return f"{format_count(left['p50'] / self.blows_per_hour)} h of work"
+            return f"{spoken.count(left['p50'] / self.blows_per_hour)} h of work"
         return "> 100 y" if date is None else date.rpartition("-")[0]
 
     @property
@@ -247,13 +214,13 @@ class Count(TableResult):
         if j is None:
             return f"{text}, no damage"
         names = self.model.robot.flexible_names
-        used = told_share(self.counted.totals.damage[j])
+        used = spoken.per_cent(self.counted.totals.damage[j])
         text += f", {names[j]} has used {used} % of its life"
         first = self.first_to_fail
         left = None if first is None else self.left(first)
         if first is None or left is None:
             return text
-        low, middle, high = (told_blows(float(f"{left[p]:.2g}")) for p in ("p10", "p50", "p90"))
+        low, middle, high = (spoken.count(float(f"{left[p]:.2g}")) for p in ("p10", "p50", "p90"))
         return f"{text}; {names[first]} lasts {middle} blows more (P10 to P90: {low} to {high})"
 
     @property

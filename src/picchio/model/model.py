@@ -80,10 +80,13 @@ class Model:
 
         Args:
             robot: a robot (with the effects it was saved with) or a model.
-            gravity_stiffness: see the class; off for a robot.
+            gravity_stiffness: see the class; of a robot what its fit assumed, else off.
             gravity_balanced: likewise.
         """
-        model = robot if isinstance(robot, Model) else cls(robot)
+        if not isinstance(robot, Model):
+            model = cls(robot, robot.adds_gravity(gravity_stiffness, usual=False))
+        else:
+            model = robot
         if gravity_stiffness is not None:
             model = replace(model, gravity_stiffness=gravity_stiffness)
         if gravity_balanced is not None:

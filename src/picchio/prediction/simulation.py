@@ -79,7 +79,7 @@ def simulate(
     robot_name: str | None = None,
     effects: Sequence[Effect] = (),
     seed: int | None = None,
-    gravity_stiffness: bool = True,
+    gravity_stiffness: bool | None = None,
     parquet: bool = False,
     overwrite: bool = False,
     progress: Callable[[int, int], None] | None = None,
@@ -121,7 +121,9 @@ def simulate(
         warn_beyond_limits(loaded, [loaded.pose(p) for p in asked.poses], "the plan")  # type: ignore[arg-type]
         every = [*(table.build(loaded) for table in asked.effect), *effects]
         _refuse_unread(every, asked, loaded)
-        model = Model(loaded, gravity_stiffness).with_effects(_drawn(asked, every, names))
+        model = Model(loaded, loaded.adds_gravity(gravity_stiffness, usual=True)).with_effects(
+            _drawn(asked, every, names)
+        )
         table: dict[str, Any] = {
             "robot": robot_name or (loaded.name if robot is loaded else str(robot)),
             "tool": loaded.tool_frame,

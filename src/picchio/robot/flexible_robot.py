@@ -47,6 +47,7 @@ class FlexibleRobot:
         tool_point: the link at whose origin the force acts.
         effect_tables: of a saved model: how the world departs from the robot's files, as
             `picchio.model.effects.from_dict` reads it.
+        fitted_gravity: of a saved model: whether its fit added gravity's stiffness; None: not said.
         warnings: what was warned of while it was loaded.
         findings: what is impossible or doubtful about its own numbers; among the warnings, too.
         spreads: how well values are known, by name such as "stiffness.joint_1".
@@ -67,6 +68,7 @@ class FlexibleRobot:
     rigid: RigidModel
     tool_point: str
     effect_tables: tuple[Mapping[str, Any], ...] = ()
+    fitted_gravity: bool | None = None
     warnings: tuple[str, ...] = ()
     findings: tuple[Finding, ...] = ()
     spreads: Mapping[str, Spread] = field(default_factory=dict)
@@ -225,6 +227,16 @@ class FlexibleRobot:
         index = self.flexible_index
         balanced, _ = balancing(self.flexible_joints, self.tree, full[index])
         return self.rigid.gravity_torque(full)[index] + balanced
+
+    def adds_gravity(self, asked: bool | None, usual: bool) -> bool:
+        """Whether gravity's stiffness is added to the springs'.
+
+        Args:
+            asked: by the user; None where nothing was.
+            usual: of robots of which no fit assumed anything.
+        """
+        said = self.fitted_gravity if asked is None else asked
+        return usual if said is None else said
 
     def gravity_stiffness(self, pose: ArrayLike) -> Array:
         """The gravity stiffness dg/dq (n, n) of the flexible joints, N m/rad, with balancers.

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from picchio.core import spoken
 from picchio.core.errors import InputError
 from picchio.core.html import sheet
 from picchio.core.json_files import read_json
@@ -21,7 +22,7 @@ from picchio.core.results import Result, plain
 from picchio.core.toml import read_toml
 from picchio.robot.loading.load import load_robot
 from picchio.robot.units import units_of
-from picchio.studies.assessment.result import Assessment, format_count
+from picchio.studies.assessment.result import Assessment
 from picchio.studies.assessment.run import assess
 from picchio.studies.default_task import task_of
 
@@ -158,6 +159,22 @@ class Comparison(Result):
         if "picchio-assessment/1" not in {item.format for item in self.items}:
             return self.results
         return tuple(row for row in self.results if row.key.rpartition(".")[2] in _FIGURES)
+
+    @property
+    def bottom_line(self) -> str:
+        """How each fares and which is furthest from a limit; "" without two verdicts."""
+        judged = [item for item in self.items if item.verdict]
+        if len(judged) < 2:
+            return ""
+        told = ", ".join(f"{i.name} {str(i.verdict['status']).replace('-', ' ')}" for i in judged)
+        margins = {i.name: i.verdict.get("margin") for i in judged}
+        known = {name: margin for name, margin in margins.items() if _number(margin)}
+        if len(known) < len(judged) or len(set(known.values())) == 1:
+            return told
+        best = max(known, key=lambda name: known[name])
+        least = min(known, key=lambda name: known[name])
+        ratio = spoken.number(known[best] / known[least])
+        return f"{told}; the margin of {best} is {ratio} times that of {least}"
 
     def _headline(self) -> str:
         names = ", ".join(item.name for item in self.items)
@@ -404,7 +421,7 @@ def _shown(key: str, side: Mapping[str, Any], first: Any) -> str:
     if last in ("rivets_to_failure", "p10", "p50", "p90") and not isinstance(value, list):
         # Null is a life without end, if there is a shaft at all.
         known = key in side and side.get(f"{before}.sn_curve", "?") != ""
-        return format_count(math.inf if known and value is None else value or math.nan)
+        return spoken.count(math.inf if known and value is None else value or math.nan)
     if value in (None, ""):
         return "-"
     if isinstance(value, bool):

@@ -32,6 +32,7 @@ from picchio.cli.output import (
     console,
     count_of,
     deliver,
+    details,
     notice_first,
     progress,
     styled,
@@ -39,10 +40,10 @@ from picchio.cli.output import (
     telling,
     write_report,
 )
+from picchio.core import spoken
 from picchio.core.errors import InputError
 from picchio.core.results import plain
 from picchio.robot.units import column
-from picchio.studies.assessment.result import format_count
 
 if TYPE_CHECKING:
     from picchio.cli.layout import FittedTable
@@ -137,7 +138,7 @@ def assess(
             "--compare-methods", help="From the paper's method to this one, step by step."
         ),
     ] = False,
-    gravity_stiffness: GravityStiffnessOption = False,
+    gravity_stiffness: GravityStiffnessOption = None,
     gravity_balanced: Annotated[
         bool,
         typer.Option("--gravity-balanced", help="The arm is balanced: no gravity in its joints."),
@@ -283,54 +284,44 @@ def assess(
 
 
 _NOT_SAFE = 3
-# Below this a torque in N m or an angle in mrad is rounding, and is printed as 0.
-_ROUNDING = 1e-9
 
 
 def show(found: Assessment, task: Task, terms: tuple[Term, ...] = ()) -> None:
-    """Print an assessment."""
+    """Print an assessment: verdict, joints, then what explains them."""
     out = console()
     told, allowed = found.verdict, found.allowable
     on = f" on {task.files[0].name}" if task.files else ""
-    out.print(styled(found.robot, f"{on}: {count_of(task.rivets_per_pass, 'rivet')} a pass"))
-    every = list(dict.fromkeys(_blows(operation) for operation in found.operations))
-    whose = "" if not task.assumed else ", of its example task" if task.files else ", assumed"
-    for blows in every:
-        out.print(f"  {blows}{whose}")
-    out.print()
+    out.print(styled(f"{found.robot}{on}: {told.headline}"))
     if allowed is not None and not allowed.contrary:
         out.print(
             f"Allowable force of one blow: {allowed.force_told}, for "
-            f"{format_count(allowed[0].rivets)} rivets with blows of this width and rate.",
+            f"{spoken.count(allowed[0].rivets)} rivets with blows of this width and rate.",
             style="bold",
         )
-    out.print(told.headline, style="bold")
-    out.print(styled("tool", f": {found.tool}"))
+    every = list(dict.fromkeys(_blows(operation) for operation in found.operations))
+    whose = "" if not task.assumed else ", of its example task" if task.files else ", assumed"
+    for blows in every:
+        out.print(f"  {blows}{whose}; {count_of(task.rivets_per_pass, 'rivet')} a pass")
     for line in filter(None, (found.notice, task.note)):
         out.print(f"{line}.", style="yellow")
     out.print()
     out.print(_estimated_table(found) if found.notice else _life_table(found))
+    for line in told.reasons:
+        if line not in (found.notice, task.note):
+            out.print(f"  - {line}")
+    details()
+    out.print(styled("tool", f": {found.tool}"))
     reducers = [
         (j.name, j.reducer, j.reducer_governed_by or "-",
-         *([_number(one.torque), _number(one.limit)] if (one := j.reducer_governing) else "--"),
+         *(map(spoken.number, (one.torque, one.limit)) if (one := j.reducer_governing) else "--"),
          j.told_percent("reducer_utilisation"))
         for j in found.joints
         if j.reducer
     ]  # fmt: skip
     if reducers:
-        heads = (
-            "joint",
-            "reducer",
-            "the limit that binds",
-            ">torque\nN m",
-            ">limit\nN m",
-            ">used\n%",
-        )
+        heads = ("joint", "reducer", "the limit that binds", ">torque\nN m", ">limit\nN m",
+                 ">utilisation\n%")  # fmt: skip
         out.print(table(heads, reducers, title="The reducers"))
-    for line in told.reasons:
-        if line not in (found.notice, task.note):
-            out.print(f"  - {line}")
-    out.print()
     out.print("The task", style="dim")
     for operation in found.operations:
         x, y, z = operation.direction
@@ -365,23 +356,26 @@ def _life_table(found: Assessment) -> FittedTable:
         """A column whose unit is each joint's own."""
         joints = found.joints
         head, cells = column([getattr(j.units, unit) for j in joints],
-                             [_number(value(j)) for j in joints])  # fmt: skip
+                             [spoken.number(value(j)) for j in joints])  # fmt: skip
         by_name = {joint.name: text for joint, text in zip(joints, cells, strict=True)}
         columns[f">{title}\n{head}"] = lambda j: by_name[j.name]
 
+    if shafts:
+        columns[">utilisation,\nshaft, %"] = lambda j: j.told_percent("utilisation")
+    if any(joint.reducer for joint in found.joints):
+        columns[">reducer,\n%"] = lambda j: j.told_percent("reducer_utilisation")
+    if shafts:
+        columns[">rivets to\nfailure"] = lambda j: j.told_life if j.sn_curve else "unknown"
+        columns[">peak\nstress\nMPa"] = lambda j: spoken.number(j.peak_shear_stress / 1e6)
+        columns[">gravity\nstress\nMPa"] = lambda j: spoken.number(j.gravity_shear_stress / 1e6)
     in_units("peak\ndeflection", "small", lambda j: 1e3 * j.peak_deflection)
     if len(shafts) < len(found.joints):
         in_units("peak\ntorque", "load", lambda j: j.peak_torque)
         in_units("gravity\ntorque", "load", lambda j: j.gravity_torque)
     if shafts:
-        columns[">peak\nstress\nMPa"] = lambda j: _number(j.peak_shear_stress / 1e6)
-        columns[">gravity\nstress\nMPa"] = lambda j: _number(j.gravity_shear_stress / 1e6)
-        columns[">utili-\nsation\n%"] = lambda j: j.told_percent("utilisation")
-    if any(joint.reducer for joint in found.joints):
-        columns[">reducer\nused\n%"] = lambda j: j.told_percent("reducer_utilisation")
-    if shafts:
-        columns[">damage\na rivet\n"] = lambda j: f"{j.damage_per_rivet:.4g}" if j.sn_curve else "-"
-        columns[">rivets to\nfailure\n"] = lambda j: j.told_life if j.sn_curve else "unknown"
+        columns[">damage\na rivet"] = lambda j: (
+            spoken.number(j.damage_per_rivet, least=0.0) if j.sn_curve else "-"
+        )
     columns["worst at"] = lambda j: f"{j.worst_operation}, pose {j.worst_pose + 1}"
     made = table(
         columns,
@@ -396,9 +390,9 @@ def _life_table(found: Assessment) -> FittedTable:
 def _estimated_table(found: Assessment) -> FittedTable:
     """The joints of a robot whose drives are estimates: intervals only."""
     load, rows = found.intervals()
-    heads = ("joint", f">peak\ntorque\n{load}", ">of its\nlimit\n%", ">fatigue:\nused\n%",
-             ">rivets to\nfailure\n", ">ends\nfirst\n%")  # fmt: skip
-    return table(heads, rows, title="The joints, P10 to P90 (gravity and blows together)")
+    heads = ("joint", ">rivets to\nfailure", ">utilisation:\ntorque, %", ">in fatigue,\n%",
+             ">ends\nfirst, %", f">torque,\n{load}")  # fmt: skip
+    return table(heads, rows, title="The joints, 80 % ranges (gravity and blows together)")
 
 
 def _share_table(found: Assessment) -> FittedTable:
@@ -414,11 +408,11 @@ def _share_table(found: Assessment) -> FittedTable:
 def _steady_table(found: Assessment) -> FittedTable:
     title = "The paper's steady state against a rivet as it happens\n(largest over the task"
     units = [found.joint(check.joint).units.small for check in found.steady_state]
-    small, steady = column(units, [_number(c.steady_peak * 1e3) for c in found.steady_state])
-    _, rest = column(units, [_number(c.rest_peak * 1e3) for c in found.steady_state])
+    small, steady = column(units, [spoken.number(c.steady_peak * 1e3) for c in found.steady_state])
+    _, rest = column(units, [spoken.number(c.rest_peak * 1e3) for c in found.steady_state])
     heads = ["joint", f">steady\npeak\n{small}", f">rivet's\npeak\n{small}", ">\nratio\n"]
     rows = [
-        [check.joint, steady[k], rest[k], _number(check.peak_ratio)]
+        [check.joint, steady[k], rest[k], spoken.number(check.peak_ratio)]
         for k, check in enumerate(found.steady_state)
     ]
     if any(not math.isnan(check.paper_life) for check in found.steady_state):
@@ -430,7 +424,7 @@ def _steady_table(found: Assessment) -> FittedTable:
         ]
         for row, check in zip(rows, found.steady_state, strict=True):
             lives = (check.paper_life, check.counted_life)
-            row += [*map(format_count, lives), _number(check.life_ratio)]
+            row += [*map(spoken.count, lives), spoken.number(check.life_ratio)]
     return table(heads, rows, title=f"{title})")
 
 
@@ -439,7 +433,7 @@ def _terms_table(terms: tuple[Term, ...]) -> FittedTable:
     for term in terms:
         known = math.isfinite(term.factor)
         compared = (f"{term.factor:.3g}", term.against or "") if known else ("", "")
-        rows.append([term.name, format_count(term.rivets_to_failure), *compared, term.what])
+        rows.append([term.name, spoken.count(term.rivets_to_failure), *compared, term.what])
     return table(
         ("term", ">rivets to\nfailure", ">times the\nlife of", "", "what changes"),
         rows,
@@ -449,28 +443,21 @@ def _terms_table(terms: tuple[Term, ...]) -> FittedTable:
 
 def _show_allowable(found: AllowableLoads, task: Task, life: Assessment) -> None:
     """Print what a target life allows."""
-    from picchio.studies.assessment.backwards import told_ends
-
     out = console()
     load, torques = column(
-        [life.joint(j.joint).units.load for j in found], [_number(j.peak_torque) for j in found]
+        [life.joint(j.joint).units.load for j in found],
+        list(map(spoken.number, (j.peak_torque for j in found))),
     )
     peaks = dict(zip((j.joint for j in found), torques, strict=True))
     columns: dict[str, Callable[[Allowable], str]] = {
         "joint": lambda j: j.joint,
-        ">rivets\nas it is": lambda j: format_count(j.life),
-        ">force\ntimes": lambda j: (
-            "-"
-            if j.met is None
-            else "no end"
-            if math.isinf(j.force_factor)
-            else f"{j.force_factor:.4g}"
-        ),
+        ">rivets\nas it is": lambda j: spoken.count(j.life),
+        ">force\ntimes": lambda j: "-" if j.met is None else spoken.number(j.force_factor),
         "by its": lambda j: j.governed_by or "-",
         ">hits\na rivet": lambda j: (
-            "-" if j.met is None else "no end" if j.hits is None else str(j.hits)
+            "-" if j.met is None else spoken.UNLIMITED if j.hits is None else str(j.hits)
         ),
-        ">shaft radius\nat least\nmm": lambda j: _number(1e3 * j.radius),
+        ">shaft radius\nat least\nmm": lambda j: spoken.number(1e3 * j.radius),
         f">peak\ntorque\n{load}": lambda j: peaks[j.joint],
         "smallest\nreducer": lambda j: j.reducer or "-",
     }
@@ -478,11 +465,11 @@ def _show_allowable(found: AllowableLoads, task: Task, life: Assessment) -> None
     sure += "" if found.held is None else ", at the stated values"
     out.print(table(
         columns, ([cell(joint) for cell in columns.values()] for joint in found),
-        title=f"What a life of {format_count(found[0].rivets)} rivets{sure} allows",
+        title=f"What a life of {spoken.count(found[0].rivets)} rivets{sure} allows",
     ))  # fmt: skip
     for key, ends in found.intervals.items():
         if not isinstance(ends, dict):
-            out.print(f"In 80 % of the drawn cases the most {_MOST[key]}: {told_ends(ends)}.")
+            out.print(f"In 80 % of the drawn cases the most {_MOST[key]}: {spoken.between(ends)}.")
     if found.held is None and math.isfinite(found.force_factor):
         forces = ", ".join(
             f"{op.name} {found.force_factor * op.excitation.peak_force:.4g} N"
@@ -495,12 +482,6 @@ def _show_allowable(found: AllowableLoads, task: Task, life: Assessment) -> None
 
 
 _MOST = {"force": "force of the blows, N", "hits": "hits a rivet", "rivets": "rivets"}
-
-
-def _number(value: float) -> str:
-    if math.isnan(value):
-        return "-"
-    return "0" if abs(value) < _ROUNDING else f"{value:.4g}"
 
 
 def _blows(operation: OperationResult) -> str:

@@ -11,18 +11,18 @@ from picchio.cli.options import FlexOption, JsonOption, ReportOption, TaskOption
 from picchio.cli.output import (
     console,
     deliver,
+    details,
     progress,
     styled,
     table,
     write_report,
 )
+from picchio.core import spoken
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from picchio.studies.comparison import Comparison, Difference
-
-_MOST = 40  # rows on a screen
 
 
 @app.command(epilog="Example: picchio compare before.json after.json --report comparison.html")
@@ -59,10 +59,19 @@ def compare(
 
 def _show(found: Comparison) -> None:
     out = console()
-    for item in found.items:
-        out.print(styled(item.name, f": {item.verdict['headline']}" if item.verdict else ""))
-    out.print()
+    if found.bottom_line:
+        out.print(f"{found.bottom_line}.", style="bold")
+    judged = [item for item in found.items if item.verdict]
+    rows = [[item.name, *(str(item.verdict.get(key) or "-") for key in ("governed_by", "joint")),
+             spoken.number(item.verdict.get("margin"))] for item in judged]  # fmt: skip
+    if rows:
+        out.print()
+        heads = ("", "governed by", "joint", ">allowable\nover actual")
+        out.print(table(heads, rows))
     _show_rows(found, found.figures, "What differs in the results")
+    details()
+    for item in judged:
+        out.print(styled(item.name, f": {item.verdict['headline']}"))
     _show_rows(found, found.entered, "What differs in the inputs")
     for line in found.notes:
         out.print(f"  - {line}")
@@ -75,15 +84,11 @@ def _show_rows(found: Comparison, rows: Sequence[Difference], title: str) -> Non
         return
     names = [item.name for item in found.items]
     two = len(names) == 2
-    cells = [
-        [row.label, *row.shown, *([_ratio(row.ratios[1])] if two else [])] for row in rows[:_MOST]
-    ]
+    cells = [[row.label, *row.shown, *([_ratio(row.ratios[1])] if two else [])] for row in rows]
     out.print(
         table(["", *(f">{n}" for n in names), *([">ratio"] if two else [])], cells, title=title)
     )
-    if len(rows) > _MOST:
-        out.print(f"... and {len(rows) - _MOST} more: --json and --report have them.\n")
 
 
 def _ratio(value: float) -> str:
-    return "" if value != value else f"{value:.3g}"
+    return "" if value != value else spoken.number(value, least=0.0)

@@ -40,7 +40,7 @@ def envelope(
     flex: FlexOption = None,
     tool: ToolOption = None,
     reducers: ReducersOption = None,
-    gravity_stiffness: GravityStiffnessOption = False,
+    gravity_stiffness: GravityStiffnessOption = None,
     json: JsonOption = None,
 ) -> None:
     """The worst force direction of every joint at a pose.

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from picchio.cli.output import console, styled, table
+from picchio.core import spoken
 from picchio.core.errors import InputError
 from picchio.robot.spread import ESTIMATE, is_estimate
-from picchio.studies.assessment.result import format_count
 
 if TYPE_CHECKING:
     from picchio.fatigue.uncertain_lives import Uncertain
@@ -88,11 +88,11 @@ def show_spread(found: UncertainLife) -> None:
     joints = {} if found.estimated else found.joints
     for name, spread in {**joints, "robot": found.robot}.items():
         if spread.p10 == spread.p90:
-            rows.append([name, "P10 to P90", format_count(spread.p50), ""])
+            rows.append([name, "P10 to P90", spoken.count(spread.p50), ""])
             continue
         for key in spread.quantiles:
-            low, high = (format_count(float(f"{end:.3g}")) for end in spread.sampling[key])
-            told = format_count(spread.rounded(key))
+            low, high = (spoken.count(float(f"{end:.3g}")) for end in spread.sampling[key])
+            told = spoken.count(spread.rounded(key))
             rows.append([name, key.upper(), told, low if low == high else f"{low} to {high}"])
             name = ""
     robot = found.robot
@@ -127,7 +127,7 @@ def show_spread(found: UncertainLife) -> None:
     _show_measurements(found)
     for name, scan in found.scans.items():
         lines = [
-            [f"{scan.factor[k]:.3g}", format_count(float(f"{scan.life[k]:.3g}"))]
+            [f"{scan.factor[k]:.3g}", spoken.count(float(f"{scan.life[k]:.3g}"))]
             for k in scan.turning_points()
         ]
         out.print(table(

@@ -28,8 +28,8 @@ from picchio.cli.output import (
     styled,
     table,
 )
+from picchio.core import spoken
 from picchio.robot.annotations.flexibility import estimate_notice
-from picchio.studies.assessment.result import format_count
 
 if TYPE_CHECKING:
     from picchio.studies.placement.result import Placement
@@ -133,13 +133,7 @@ def _show(found: Placement, off: float) -> None:
     # Zeros are added for the sake of their sign.
     x, y, z = found.best.spot.move[:3].round(3) + 0.0
     heading = round(math.degrees(found.best.spot.move[3]), 2) + 0.0
-    out.print(
-        styled(
-            found.robot,
-            f": {found.placements} placements tried all over, {found.reached} of them within "
-            f"reach; {found.nearby} more near the best",
-        )
-    )
+    out.print(styled(f"{found.robot}: {_gain(found)}"))
     if found.moved:
         out.print(
             f"  work: shift by ({x:.3f}, {y:.3f}, {z:.3f}) m, turn by {heading:.2f} deg "
@@ -155,10 +149,10 @@ def _show(found: Placement, off: float) -> None:
     rows = [
         (
             now.name,
-            format_count(now.rivets_to_failure),
-            f"{100 * now.utilisation:.4g}",
-            format_count(then.rivets_to_failure),
-            f"{100 * then.utilisation:.4g}",
+            spoken.count(now.rivets_to_failure),
+            spoken.per_cent(now.utilisation),
+            spoken.count(then.rivets_to_failure),
+            spoken.per_cent(then.utilisation),
         )
         for now, then in zip(found.start.joints, found.best.joints, strict=True)
     ]
@@ -166,7 +160,6 @@ def _show(found: Placement, off: float) -> None:
              ">utilisation,\nbest, %")  # fmt: skip
     title = "At the stated values, which are uncertain" if found.sure else None
     out.print(table(heads, rows, title=title))
-    out.print(_gain(found))
     if found.moved and found.explained():
         out.print(found.explained())
     if found.sure:
@@ -174,18 +167,22 @@ def _show(found: Placement, off: float) -> None:
     out.print(_cost_of_off(found, off))
     if found.by_effort:
         out.print("Utilisation: torque over the URDF's effort limit; no shaft or reducer is known.")
+    out.print(
+        f"{found.placements} placements tried all over, {found.reached} of them within reach; "
+        f"{found.nearby} more near the best."
+    )
     out.print(f"Self-collisions: {found.self_collision}.")
 
 
 def _gain(found: Placement) -> str:
-    utilisation = f"the highest utilisation falls {found.utilisation_gain:.4g} times"
-    if found.utilisation_gain < 1.0:
-        utilisation = f"the highest utilisation rises {1.0 / found.utilisation_gain:.4g} times"
-    if math.isnan(found.life_gain):
-        return f"Gain: no life has an end; {utilisation}."
-    if math.isinf(found.life_gain):
-        return f"Gain: the life no longer has an end; {utilisation}."
-    return f"Gain: the weakest joint lives {found.life_gain:.4g} times as long; {utilisation}."
+    gain, life = found.utilisation_gain, found.life_gain
+    way, times = ("falls", gain) if gain >= 1.0 else ("rises", 1.0 / gain)
+    utilisation = f"the highest utilisation {way} {spoken.number(times)} times"
+    if math.isnan(life):
+        return f"Gain: every life is unlimited; {utilisation}."
+    if math.isinf(life):
+        return f"Gain: the life becomes unlimited; {utilisation}."
+    return f"Gain: the weakest joint lives {spoken.number(life)} times as long; {utilisation}."
 
 
 def _cost_of_off(found: Placement, off: float) -> str:
@@ -199,7 +196,7 @@ def _cost_of_off(found: Placement, off: float) -> str:
             share = least / found.best.rivets_to_failure
             parts.append(f"the life is at worst {share:.3g} times as long")
         most = max(o.utilisation for o in near) / max(found.best.utilisation, 1e-300)
-        parts.append(f"the utilisation at worst {most:.4g} times as high")
+        parts.append(f"the utilisation at worst {spoken.number(most)} times as high")
     if lost:
         ways = ", ".join(
             f"{'+' if c > 0 else '-'}{axis}"

@@ -79,7 +79,7 @@ def view(
     flex: FlexOption = None,
     tool: ToolOption = None,
     reducers: ReducersOption = None,
-    gravity_stiffness: GravityStiffnessOption = False,
+    gravity_stiffness: GravityStiffnessOption = None,
     json: JsonOption = None,
 ) -> None:
     """The robot in 3-D as HTML: envelopes, rivets and vibration.

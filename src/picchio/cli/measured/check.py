@@ -22,10 +22,12 @@ from picchio.cli.output import (
     console,
     count_of,
     deliver,
+    details,
     progress,
     say_warning,
     styled,
     table,
+    whole,
     write_report,
 )
 from picchio.core.errors import InputError
@@ -34,7 +36,6 @@ if TYPE_CHECKING:
     from picchio.cli.layout import FittedTable
     from picchio.measurement.quality.report import QualityReport, RecordSummary
 
-_MOST_RECORDS = 16
 _STYLES = {"error": "bold red", "warning": "yellow", "note": "dim"}
 
 
@@ -65,13 +66,7 @@ def check(
             "--keep-going", help="Where a record cannot be read, list it and check the others."
         ),
     ] = False,
-    verbose: Annotated[
-        bool,
-        typer.Option(
-            "--verbose", "-v", help="Show every record, and each finding on a line of its own."
-        ),
-    ] = False,
-    gravity_stiffness: GravityStiffnessOption = True,
+    gravity_stiffness: GravityStiffnessOption = None,
     report: ReportOption = None,
     json: JsonOption = None,
 ) -> None:
@@ -97,7 +92,7 @@ def check(
             keep_going=keep_going, progress=tell,
         )  # fmt: skip
     write_report(found, report, gravity_stiffness=gravity_stiffness)
-    deliver(found.to_dict(), json, lambda: _show(found, verbose))
+    deliver(found.to_dict(), json, lambda: _show(found))
     if json == "-":  # what people would have read in the table
         for group in found.groups():
             if group[0].severity != "note":
@@ -110,14 +105,21 @@ def check(
         )
 
 
-def _show(report: QualityReport, verbose: bool) -> None:
+def _show(report: QualityReport) -> None:
     out = console()
+    counts = {word: report.count(word) for word in _STYLES}
+    wrong = ", ".join(count_of(n, word) for word, n in counts.items() if n)
+    if not (counts["error"] or counts["warning"]):
+        wrong = (f"nothing wrong was found ({counts['note']} notes): {len(report.checks)} kinds of "
+                 "faults were looked for")  # fmt: skip
+    name = str(report.campaign.folder or "campaign in memory")
+    out.print(styled(f"{name}: {wrong}."))
     _show_contents(report)
-    shown = report.records if verbose else report.records[:_MOST_RECORDS]
-    out.print(_record_table(shown))
-    if len(shown) < len(report.records):
-        out.print(f"... and {len(report.records) - len(shown)} more: --verbose lists them.\n")
+    if report.findings:
+        out.print(_finding_table(report))
     out.print(_channel_table(report))
+    details()
+    out.print(_record_table(report.records))
     if report.repeats:
         worst = max(report.repeats, key=lambda c: c.difference)
         out.print(
@@ -126,22 +128,13 @@ def _show(report: QualityReport, verbose: bool) -> None:
             f"(median), at worst by {100 * worst.difference:.2g} % ({worst.first} and "
             f"{worst.second}, {worst.channel}).\n"
         )
-    if report.findings:
-        out.print(_finding_table(report, verbose))
-    counts = {word: report.count(word) for word in _STYLES}
-    if counts["error"] or counts["warning"]:
-        out.print(", ".join(count_of(n, word) for word, n in counts.items() if n) + ".")
-    else:
-        out.print(f"Nothing wrong was found ({counts['note']} notes): "
-                  f"{len(report.checks)} kinds of faults were looked for.")  # fmt: skip
 
 
 def _show_contents(report: QualityReport) -> None:
     out = console()
     campaign, records = report.campaign, report.records
-    name = str(campaign.folder) if campaign.folder is not None else "campaign in memory"
     robot = report.robot.name if report.robot else "no robot: limits and axes are not checked"
-    out.print(styled(name, f": {count_of(len(records), 'record')}; {robot}"))
+    out.print(f"{count_of(len(records), 'record')}; {robot}")
     hits = [r for r in records if r.kind == "percussion"]
     motions = [r for r in records if r.kind == "motion"]
     if hits:
@@ -224,9 +217,9 @@ def _channel_table(report: QualityReport) -> FittedTable:
     return table(heads, rows, title="Channels and their noise")
 
 
-def _finding_table(report: QualityReport, verbose: bool) -> FittedTable:
+def _finding_table(report: QualityReport) -> FittedTable:
     rows = []
-    for group in [[finding] for finding in report.findings] if verbose else report.groups():
+    for group in [[finding] for finding in report.findings] if whole() else report.groups():
         worst = group[0]
         channels = sorted({f.channel for f in group if f.channel})
         files = sorted({f.record for f in group if f.record})

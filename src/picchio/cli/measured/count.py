@@ -26,6 +26,7 @@ from picchio.cli.output import (
     console,
     count_of,
     deliver,
+    details,
     notice_first,
     progress,
     say_warning,
@@ -34,14 +35,15 @@ from picchio.cli.output import (
     to_write,
     write_report,
 )
+from picchio.core import spoken
 from picchio.core.errors import InputError
 from picchio.core.guard import guard
 from picchio.robot.annotations.flexibility import estimate_notice
-from picchio.studies.assessment.result import format_count
 
 if TYPE_CHECKING:
     from picchio.ledger.fleet import Fleet
     from picchio.ledger.result import Count
+    from picchio.studies.tasks import Task
 
 
 @app.command(
@@ -116,6 +118,7 @@ def count(
     """
     import picchio
     from picchio.ledger.out import write_diagnostics, write_prometheus
+    from picchio.studies.default_task import task_of
 
     if watch and not log:
         raise InputError("needs a folder to watch", key="--log")
@@ -162,7 +165,7 @@ def count(
                 def show(found: Count = found) -> None:
                     if notice := estimate_notice(loaded.name, loaded.origins):
                         console().print(f"{notice}.\n", style="bold yellow")
-                    _show(found)
+                    _show(found, task_of(loaded, task))
 
                 deliver(found.to_dict(arrays=True), json, show)
         if not watch:
@@ -171,16 +174,14 @@ def count(
 
 
 def _show_fleet(found: Fleet) -> None:
-    from picchio.ledger.result import told_share
-
     out = console()
     rows = []
     for row in found.robots:
         left = row["blows_left"] or {}
         rows.append((
             row["name"], str(row["logs"] or 0), str(row["blows"] or 0), row["joint"] or "-",
-            told_share(math.nan if row["damage"] is None else row["damage"]),
-            format_count(math.inf if left.get("p50") is None else left["p50"]) if left else "-",
+            spoken.per_cent(row["damage"]),
+            spoken.count(math.inf if left.get("p50") is None else left["p50"]) if left else "-",
             str(len(row["changes"])),
         ))  # fmt: skip
     heads = ("robot", ">logs", ">blows", "joint", ">life\nused, %", ">blows left,\nP50", ">changed")
@@ -209,10 +210,65 @@ def _listing(logs: list[Path]) -> list[tuple[str, int, int]]:
     return sorted((name, stat.st_size, stat.st_mtime_ns) for name, stat in stats)
 
 
-def _show(found: Count) -> None:
-    from picchio.ledger.result import told_interval, told_share
-
+def _show(found: Count, task: Task) -> None:
     out = console()
+    forces = {operation.excitation.peak_force for operation in task.operations}
+    force = spoken.between((min(forces), max(forces)))
+    out.print(
+        styled(
+            found.model.robot.name,
+            f": {found.blows} blows in {count_of(found.logs, 'log')} of {found.logged}; "
+            + (
+                "all of them seen"
+                if found.seen_share == 1.0
+                else f"{'no force' if not found.seen_share else 'not every force'} recorded, the "
+                f"task's {force} N assumed"
+            ),
+        )
+    )
+    end = found.first_to_fail
+    if end is not None:
+        name = found.model.robot.flexible_names[end]
+        gain = float(found.if_force(0.9)[end])
+        longer = f" With blows 10 % weaker it would last {gain:.3g} times as long."
+        out.print(f"{name} ends the life, at {found.pace}.{longer}")
+        if found.blows_a_day is None:
+            out.print("Less than a day was logged: --hours-per-day H gives dates.")
+    elif found.blows:
+        out.print("Every life is unlimited: no blow damages a shaft or a drive.")
+    if blow := found.counted.usual_blow:
+        rate = "" if blow["rate"] is None else f", {blow['rate']:.3g} a second"
+        force, width, samples = (blow[key] or 0.0 for key in ("force", "width", "samples"))
+        wide = f"{1e3 * width:.3g} ms wide ({samples:.3g} samples)"
+        out.print(f"Blows as seen: {force:.4g} N, {wide}{rate}, in the mean.")
+    for change in found.changes:
+        out.print(styled("changed: ", change["words"], style="bold yellow"))
+    if found.exchange is not None:
+        out.print(styled("another robot? ", found.exchange.words, style="bold yellow"))
+    rows = []
+    for joint in found.joints():
+        left = joint["blows_left"]
+        rows.append((
+            joint["name"], spoken.per_cent(joint["damage"]),
+            spoken.between(joint["damage_interval"] or [None], spoken.per_cent),
+            *("-" if left is None else spoken.count(left[p]) for p in ("p10", "p50", "p90")),
+            found.reached(left) or "-",
+        ))  # fmt: skip
+    heads = ("joint", ">life\nused, %", ">90 % interval,\n%", ">blows left,\nP10", ">P50", ">P90",
+             ">P50 is\nreached")  # fmt: skip
+    out.print(table(heads, rows, title="Life used and left"))
+    for name, why in found.refused:
+        out.print(styled(f"not counted: {name}", f": {why}", style="bold yellow"))
+    for note in found.notes:
+        out.print(f"  - {note}")
+    details()
+    places = found.stations()
+    if places and end is not None:
+        places = sorted(places, key=lambda s: -float(s["share"][end]))[:3]
+        shares = ", ".join(
+            f"{100 * s['share'][end]:.3g} % at ({_angles(s['pose'])})" for s in places
+        )
+        out.print(f"Where it comes from: {shares}.")
     alike: dict[tuple[str, ...], list[str]] = {}
     for name in found.added:
         told = [line.partition(", measured")[0] for line in found.detected[name]]
@@ -225,66 +281,7 @@ def _show(found: Count) -> None:
             out.print(f"counted {ends}: {count_of(len(others), 'log')} like it")
     if found.known:
         out.print(f"{count_of(len(found.known), 'log')} counted before")
-    for name, why in found.refused:
-        out.print(styled(f"not counted: {name}", f": {why}", style="bold yellow"))
-    out.print(
-        styled(
-            found.model.robot.name,
-            f": {found.blows} blows in {count_of(found.logs, 'log')} of {found.logged}; "
-            + (
-                "all of them seen"
-                if found.seen_share == 1.0
-                else f"{100 * found.seen_share:.4g} % of them seen, the others assumed"
-            ),
-        )
-    )
-    if blow := found.counted.usual_blow:
-        rate = "" if blow["rate"] is None else f", {blow['rate']:.3g} a second"
-        force, width, samples = (blow[key] or 0.0 for key in ("force", "width", "samples"))
-        wide = f"{1e3 * width:.3g} ms wide ({samples:.3g} samples)"
-        out.print(f"Blows as seen: {force:.4g} N, {wide}{rate}, in the mean.")
-    rows = []
-    for joint in found.joints():
-        left = joint["blows_left"]
-        rows.append((
-            joint["name"], told_share(joint["damage"]), told_interval(joint["damage_interval"], 2),
-            *("-" if left is None else _many(left[p]) for p in ("p10", "p50", "p90")),
-            found.reached(left) or "-",
-        ))  # fmt: skip
-    heads = ("joint", ">life\nused, %", ">90 % interval,\n%", ">blows left,\nP10", ">P50", ">P90",
-             ">P50 is\nreached")  # fmt: skip
-    out.print(table(heads, rows, title="Life used and left (M: millions of blows)"))
-    end = found.first_to_fail
-    if end is not None:
-        name = found.model.robot.flexible_names[end]
-        gain = float(found.if_force(0.9)[end])
-        longer = f" With blows 10 % weaker it would last {gain:.3g} times as long."
-        out.print(f"{name} ends the life, at {found.pace}.{longer}")
-        if found.blows_a_day is None:
-            out.print("Less than a day was logged: --hours-per-day H gives dates.")
-    elif found.blows:
-        out.print("No life has an end: no blow damages a shaft or a drive.")
-    places = found.stations()
-    if places and end is not None:
-        places = sorted(places, key=lambda s: -float(s["share"][end]))[:3]
-        shares = ", ".join(
-            f"{100 * s['share'][end]:.3g} % at ({_angles(s['pose'])})" for s in places
-        )
-        out.print(f"Where it comes from: {shares}.")
-    for change in found.changes:
-        out.print(styled("changed: ", change["words"], style="bold yellow"))
-    if found.exchange is not None:
-        out.print(styled("another robot? ", found.exchange.words, style="bold yellow"))
-    for note in found.notes:
-        out.print(f"  - {note}")
 
 
 def _angles(pose: np.ndarray) -> str:
     return ", ".join(f"{value:.3g}" for value in pose)
-
-
-def _many(blows: float) -> str:
-    from picchio.ledger.result import told_blows
-
-    told = told_blows(blows)
-    return f"{float(f'{blows / 1e6:.3g}'):,g} M" if blows >= 1e6 and told[0].isdigit() else told

@@ -30,8 +30,8 @@ from picchio.cli.output import (
     telling,
     write_report,
 )
+from picchio.core import spoken
 from picchio.core.files import write_text
-from picchio.studies.assessment.result import format_count
 
 if TYPE_CHECKING:
     from rich.text import Text
@@ -83,7 +83,7 @@ def diagnose(
     flex: FlexOption = None,
     tool: ToolOption = None,
     reducers: ReducersOption = None,
-    gravity_stiffness: GravityStiffnessOption = True,
+    gravity_stiffness: GravityStiffnessOption = None,
     json: JsonOption = None,
 ) -> None:
     """What a simulation gets wrong about measured data, and why.
@@ -126,17 +126,28 @@ _STATUS = {
     "both": "percussion and motion records agree",
     "percussion": "by the percussion records; the motion records cannot see it",
     "motion": "by the motion records; the percussion records cannot see it",
-    "drive": "by the motion records; it acts in the drive, which stands still while the tool hits",
+    "drive": "by the motion records; it acts in the drive (motors assumed locked under blows)",
 }
 
 
 def show_diagnosis(found: Diagnosis, plan: Path | None = None) -> None:
     """Print verdict, causes, gain, life and what to measure next, for which a plan was asked."""
-    from picchio.diagnosis.result import VERDICTS, differences, in_tolerances, in_words
+    from picchio.diagnosis.result import differences, in_tolerances, in_words
     from picchio.model.effects.registry import effect_class
 
     out = console()
-    out.print(styled(found.verdict, f": {found.note or VERDICTS[found.verdict]}."))
+    out.print(styled(f"{found.answer}."))
+    gain = found.gain
+    if gain is not None:
+        where = f"On {count_of(len(gain.held_out_records), 'record')} held out"
+        if not gain.held_out_records:
+            where = "Nothing was held out; on what was fitted"
+        out.print(f"{where} {gain.told}.")
+    if found.life is not None:
+        _show_life(found.life)
+    ask = found.next_measurement
+    if ask:
+        out.print(f"Measure next: {ask['why']}", highlight=False)
     if found.causes:
         rows = []
         for cause in found.causes:
@@ -164,12 +175,6 @@ def show_diagnosis(found: Diagnosis, plan: Path | None = None) -> None:
     for why in dict.fromkeys(found.not_looked_for.values()):
         names = ", ".join(name for name, reason in found.not_looked_for.items() if reason == why)
         out.print(f"  not looked for: {names} ({why})")
-    gain = found.gain
-    if gain is not None:
-        where = f"On {count_of(len(gain.held_out_records), 'record')} held out"
-        if not gain.held_out_records:
-            where = "Nothing was held out; on what was fitted"
-        out.print(f"{where} {gain.told}.")
     if found.remainder is not None:
         out.print(f"  {found.remainder.told}")
     if found.told_without:
@@ -179,16 +184,15 @@ def show_diagnosis(found: Diagnosis, plan: Path | None = None) -> None:
         if told["status"] in _STATUS:
             out.print(f"  {told['effect']} of {told['target']}: {_STATUS[told['status']]}")
     if found.life is not None:
-        _show_life(found.life)
         _show_what_to_mend(found.life)
         _show_other_lives(found, found.life.get("alternatives") or ())
-    ask = found.next_measurement
     if ask:
         direction = ", ".join(f"{c:.2f}" for c in ask.get("direction", ()))
         pose = ", ".join(f"{name} {value:.2f}" for name, value in ask.get("pose", {}).items())
-        out.print(f"Measure next: {ask['why']}", highlight=False)
         if pose:
-            out.print(f"  pose {pose}; force along ({direction}), {ask.get('force', 0):g} N")
+            out.print(
+                f"Measure next at pose {pose}; force along ({direction}), {ask.get('force', 0):g} N"
+            )
     if found.life_note:
         out.print(f"Life: {found.life_note}.")
     if plan is not None and found.plan is None:
@@ -208,9 +212,6 @@ def _show_channels(told: Sequence[Mapping[str, Any]]) -> None:
 
 
 def _show_life(life: Mapping[str, Any]) -> None:
-    def used(share: float) -> str:
-        return f"{100 * share:.4g}"
-
     def between(joint: Mapping[str, Any], key: str, show: Callable[[float], str]) -> Text | str:
         """The interval, where it says more than the value."""
         low, high = (show(end) for end in joint.get(key, (math.nan, math.nan)))
@@ -219,10 +220,10 @@ def _show_life(life: Mapping[str, Any]) -> None:
     rows = []
     for name, before in life["baseline"]["joints"].items():
         sides = (before, life["extended"]["joints"][name])
-        lives = [format_count(side["rivets_to_failure"]) for side in sides]
-        rows.append([name, *lives, *(used(side["utilisation"]) for side in sides)])
-        spans = [between(side, "rivets_interval", format_count) for side in sides]
-        spans += [between(side, "utilisation_interval", used) for side in sides]
+        lives = [spoken.count(side["rivets_to_failure"]) for side in sides]
+        rows.append([name, *lives, *(spoken.per_cent(side["utilisation"]) for side in sides)])
+        spans = [between(side, "rivets_interval", spoken.count) for side in sides]
+        spans += [between(side, "utilisation_interval", spoken.per_cent) for side in sides]
         if any(spans):
             rows.append(["", *spans])
     columns = ("joint", ">rivets before", ">after", ">utilisation before %", ">after %")
@@ -247,8 +248,8 @@ def _show_what_to_mend(life: Mapping[str, Any]) -> None:
             console().print(f"  {what} does not change the life")
             continue
         told = row.get("why") or (
-            f"rivets {format_count(row['rivets_to_failure'])}, "
-            f"utilisation {100 * row['utilisation']:.4g} %"
+            f"rivets {spoken.count(row['rivets_to_failure'])}, "
+            f"utilisation {spoken.per_cent(row['utilisation'])} %"
         )
         console().print(f"  {'mend first ' if place == 0 else ''}{what}; after that: {told}")
 
@@ -259,8 +260,8 @@ def _show_other_lives(found: Diagnosis, lives: Sequence[Mapping[str, Any]]) -> N
     for pairs, other in zip(found.alternatives, lives, strict=False):
         names = " and ".join(f"{effect} of {target}" for effect, target in pairs)
         instead = other.get("why") or (
-            f"rivets {format_count(other['rivets_to_failure'])}, "
-            f"utilisation {100 * other['utilisation']:.4g} %"
+            f"rivets {spoken.count(other['rivets_to_failure'])}, "
+            f"utilisation {spoken.per_cent(other['utilisation'])} %"
         )
         out.print(f"  with {names} instead: {instead}")
     if lives:

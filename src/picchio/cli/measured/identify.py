@@ -76,7 +76,7 @@ def show_identified(found: Identification) -> None:
         mark = "yes" if k.told else styled("no", style="dim")
         rows.append([joint.name, f"{k.value:.4g}", f"{k.low:.3g} to {k.high:.3g}", mark])
     unit = "stiffness\nN m/rad, N/m"
-    out.print(table(("joint", f">{unit}", ">90 % interval", "told"), rows))
+    out.print(table(("joint", f">{unit}", ">90 % interval", "determined\nby the data"), rows))
     for joint in found.joints:
         out.print(f"  {joint.name}: {joint.stiffness.why}")
     for line in found.remarks:

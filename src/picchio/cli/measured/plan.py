@@ -27,6 +27,7 @@ from picchio.cli.output import (
     telling,
     write_report,
 )
+from picchio.core import spoken
 
 if TYPE_CHECKING:
     from picchio.diagnosis.planning.plan import PlannedTests
@@ -115,14 +116,15 @@ def _show(found: PlannedTests, to: Path | None) -> None:
                      f"{record.seconds / 60.0:.1f}"])  # fmt: skip
     if rows:
         out.print(table(("", "pose, deg or mm", "load", "read along", ">min"), rows))
-    out.print(f"It ends there: {found.choice.why}.")
-    factors = [[joint.name, f"{joint.before:.3g}", f"{joint.after:.3g}"] for joint in found.joints]
+    if to is not None:
+        out.print("Fill in the form, then:")
+        out.print(styled(f"  {found.next_command(str(to))}"), soft_wrap=True)
+    out.print(f"No more records: {found.choice.why}.")
+    factors = [[joint.name, *map(spoken.number, (joint.before, joint.after))]
+               for joint in found.joints]  # fmt: skip
     out.print(table(
         ("joint", ">now", ">then"), factors,
         title="The stiffness lies within this factor either way (90 %)",
     ))  # fmt: skip
     for note in found.notes:
         out.print(f"  - {note}")
-    if to is not None:
-        out.print("\nFill in the form, then:")
-        out.print(styled(f"  {found.next_command(str(to))}"), soft_wrap=True)

@@ -31,7 +31,7 @@ def simulate(
     flex: FlexOption = None,
     tool: ToolOption = None,
     reducers: ReducersOption = None,
-    gravity_stiffness: GravityStiffnessOption = True,
+    gravity_stiffness: GravityStiffnessOption = None,
     seed: Annotated[
         int | None,
         typer.Option(metavar="N", min=0, help="Random seed of the noise; the plan's if not given."),

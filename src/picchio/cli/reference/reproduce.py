@@ -58,16 +58,7 @@ def reproduce(
 def _show(found: Reproduction) -> None:
     screen = console()
     printed = found.study.printed
-    screen.print(styled(printed.title, f"\n{printed.journal}\n"))
-    colour = {"holds": "green", "holds only if": "yellow", "does not hold": "red",
-              "cannot be known": "dim"}  # fmt: skip
-    rows = []
-    for tried in found.claims:
-        mark = str(tried.finding.verdict)
-        told = styled(mark, f" {tried.finding.condition}", style=colour[mark])
-        rows.append((str(tried.sentence.page), tried.sentence.quote, told))
-    screen.print(table((">p.", "claim", "verdict"), rows, ruled=False))
-    screen.print(f"\n{found._headline()}.")
+    screen.print(f"{found._headline()}.", style="bold")
     lives = found.answer.table
     values, longer = lives.other.values, lives.over_printed
     screen.print(
@@ -75,3 +66,12 @@ def _show(found: Reproduction) -> None:
         f"printed curve's; S = {values['a']:,.0f} N^{values['b']:.4f} at the same mean stresses "
         f"gives seven of eight within {100 * lives.within:.2g} %."
     )
+    screen.print(f"{printed.title}, {printed.journal}")
+    colour = {"holds": "green", "holds only if": "yellow", "does not hold": "red",
+              "cannot be known": "dim"}  # fmt: skip
+    rows = []
+    for tried in found.claims:
+        mark = str(tried.finding.verdict)
+        told = styled(mark, f" {tried.finding.condition}", style=colour[mark])
+        rows.append((told, str(tried.sentence.page), tried.sentence.quote))
+    screen.print(table(("verdict", ">p.", "claim"), rows, ruled=False))

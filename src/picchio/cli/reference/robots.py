@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
+import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from picchio.cli.app import app
+import typer
+
+from picchio.cli.app import app, examples
 from picchio.cli.options import FlexOption, JsonOption, RobotArgument, output
-from picchio.cli.output import console, deliver, table
+from picchio.cli.output import console, deliver, show_all, table, whole
 
 if TYPE_CHECKING:
     from picchio.robot.loading.catalogue import RobotEntry, RobotList
 
 
-@app.command(epilog="Example: picchio robots --json robots.json")
-def robots(json: JsonOption = None) -> None:
-    """List the robots that can be named, and their stiffness data."""
+@app.command(epilog=examples("robots", "robots --all", "robots --json robots.json"))
+def robots(
+    every: Annotated[bool, typer.Option("--all", help="All of them, with their sources.")] = False,
+    json: JsonOption = None,
+) -> None:
+    """List the robots that can be named, arms with stiffness data first."""
     import picchio
 
     found = picchio.robots()
+    show_all(every or whole())
     deliver(found.to_dict(), json, lambda: _show(found))
 
 
@@ -40,13 +47,23 @@ def annotate(
     deliver(made.to_dict(), json, lambda: console().print(made._headline()))
 
 
+_ARM = range(3, 9)  # joints of an arm; more are two arms, a hand or a walker
+_BRIEF = 36  # characters of a source in a list
+
+
 def _show(found: RobotList) -> None:
+    arms = sorted(found, key=lambda entry: (not entry.stiffness_source, entry.dof not in _ARM))
     rows = []
-    for entry in found:
-        joints = entry.with_stiffness
-        span = f"{joints[0]} ... {joints[-1]}" if len(joints) > 3 else ", ".join(joints) or "-"
-        rows.append((entry.name, str(entry.dof), span, entry.problem or _origin(entry)))
-    console().print(table(("name", ">DoF", "stiffness known", "source"), rows))
+    for entry in arms:
+        joints, source = entry.with_stiffness, entry.problem or _origin(entry)
+        if not whole():  # its first words, in one line
+            source = textwrap.shorten(source, _BRIEF, placeholder=" ...")
+        span = f"{len(joints)} of {len(entry.flexible)}" if joints else "-"
+        rows.append((entry.name, str(entry.dof), span, source))
+    out = console()
+    known = sum(bool(entry.stiffness_source) for entry in arms)
+    out.print(f"{len(rows)} robots, {known} with stiffness data; --all lists all of them.")
+    out.print(table(("name", ">DoF", ">stiffness\nknown", "source"), rows))
 
 
 def _origin(entry: RobotEntry) -> str:

@@ -17,6 +17,7 @@ import numpy as np
 
 from picchio.campaign.tables import CAMPAIGN_FILE, Tolerance
 from picchio.campaign.tables import FORMAT as CAMPAIGN
+from picchio.core import spoken
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.core.files import write_text
@@ -207,8 +208,8 @@ class PlannedTests(TableResult):
         count = len(self.records)
         return (
             f"{self.robot.name}: {count} record{'' if count == 1 else 's'} in "
-            f"{self.seconds / 60.0:.0f} minutes narrow {self.outcome.words} from {now:.2f} to "
-            f"{then:.2f} decades"
+            f"{self.seconds / 60.0:.0f} minutes narrow {self.outcome.words} "
+            f"from {spoken.factor(now)} to {spoken.number(10.0**then, 2)}"
         )
 
     def _rows(self) -> list[dict[str, Any]]:

@@ -271,7 +271,7 @@ def identify_static(
     robot: FlexibleRobot,
     campaign: Campaign,
     *,
-    gravity_stiffness: bool = True,
+    gravity_stiffness: bool | None = None,
     search: bool = True,
     progress: Callable[[str], None] | None = None,
 ) -> StaticIdentification:
@@ -305,7 +305,8 @@ def identify_static(
     )  # fmt: skip
     stated = {"displacement": tolerance.dial, "dial": tolerance.dial, "deflection": _ENCODER,
               "torque": EXACT}  # fmt: skip
-    problem = Problem(tables, prior_of(robot), stated, gravity=gravity_stiffness)
+    added = robot.adds_gravity(gravity_stiffness, usual=True)
+    problem = Problem(tables, prior_of(robot), stated, gravity=added)
     for table, record in zip(tables, campaign, strict=True):
         if isinstance(table, Table) and not np.abs(table.force).max() > 0.0:
             raise InputError("no loading of this record has a force", file=record.source.path,

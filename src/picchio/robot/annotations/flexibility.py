@@ -131,10 +131,7 @@ def estimate_notice(name: str, origins: Mapping[str, str]) -> str:
     what = "stiffness, damping and strength" if "stiffness" in made else "strength"
     if any(part.endswith(".mass") for part in made):
         what = f"masses, and the {what}"
-    return (
-        f"Estimated: nobody measured the {what} of the drives of {name}. What stands here is what "
-        "such a robot probably has, and every result is an interval that holds 80 % of the cases"
-    )
+    return f"Estimated: nobody measured the {what} of the drives of {name}; results are 80 % ranges"
 
 
 def unused_entries(sources: Sequence[Source], joints: Iterable[str]) -> Iterator[str]:

@@ -8,6 +8,7 @@ from typing import Any
 
 import tomlkit
 
+from picchio.core import spoken
 from picchio.core.toml import StrictModel
 from picchio.robot.annotations.sidecar import FORMAT, JointEntry, Sidecar, given
 from picchio.robot.link import LinkEntry
@@ -159,12 +160,7 @@ def told_range(ends: tuple[float, float], digits: int = 2) -> str:
     Returns:
         the words.
     """
-    return " to ".join(_short(end, digits) for end in ends)
-
-
-def _short(value: float, digits: int) -> str:
-    rounded = float(f"{value:.{digits}g}")
-    return f"{rounded:,.0f}" if rounded >= 10 ** (digits - 1) else f"{rounded:g}"
+    return spoken.between(ends, lambda end: spoken.number(end, digits))
 
 
 def _key(name: str) -> str:

@@ -176,7 +176,8 @@ def _load(
                 raise
             raise error.placed(file=robot, key="robot") from None
         tables = tuple(table.model_dump() for table in saved.effect)
-        return replace(loaded, effect_tables=tables, files=(*loaded.files, Path(robot)))
+        return replace(loaded, effect_tables=tables, fitted_gravity=saved.gravity_stiffness,
+                       files=(*loaded.files, Path(robot)))  # fmt: skip
     found = find_robot(robot)
     root = parse_urdf(read_urdf_bytes(found.urdf), found.urdf)
     tree = read_tree(root, found.urdf)

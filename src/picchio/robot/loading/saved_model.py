@@ -39,6 +39,8 @@ class SavedModel(StrictModel):
         robot: a name from `picchio robots`, or a URDF relative to this file.
         flex: sidecar, relative to this file.
         tool: frame that carries the tool.
+        gravity_stiffness: whether the fit added gravity's stiffness dg/dq to the springs'; every
+            command then does so, too, unless told otherwise.
         notes: free text.
         provenance: where the model comes from; any keys.
         effect: how the real robot differs from its files, one table for each effect.
@@ -47,6 +49,7 @@ class SavedModel(StrictModel):
     robot: Name
     flex: Name | None = None
     tool: Name | None = None
+    gravity_stiffness: bool | None = None
     notes: str | None = None
     provenance: dict[str, Any] | None = None
     effect: list[EffectTable] = Field(default_factory=list)
@@ -84,6 +87,7 @@ def saved_model_text(
     *,
     flex: str | Path | None = None,
     tool: str | None = None,
+    gravity_stiffness: bool | None = None,
     notes: str | None = None,
     folder: Path | None = None,
     provenance: Mapping[str, Any] | None = None,
@@ -95,6 +99,7 @@ def saved_model_text(
         effects: tables with effect, target, parameters and, where needed, hidden.
         flex: sidecar.
         tool: frame that carries the tool.
+        gravity_stiffness: what the fit assumed.
         notes: free text.
         folder: where the file will stand; paths are written relative to it.
         provenance: where it comes from.
@@ -106,7 +111,9 @@ def saved_model_text(
     document["robot"] = _relative(robot, folder)
     if flex is not None:
         document["flex"] = _relative(str(flex), folder)
-    for key, value in (("tool", tool), ("notes", notes), ("provenance", provenance)):
+    given = {"tool": tool, "gravity_stiffness": gravity_stiffness, "notes": notes,
+             "provenance": provenance}  # fmt: skip
+    for key, value in given.items():
         if value is not None:
             document[key] = value
     tables = []

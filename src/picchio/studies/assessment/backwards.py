@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from picchio.core import spoken
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.core.html import sheet
@@ -20,7 +21,7 @@ from picchio.core.results import TableResult
 from picchio.fatigue.counting.counter import Residue, rainflow
 from picchio.fatigue.counting.cycles import Cycles
 from picchio.fatigue.mean_stress import Rule
-from picchio.fatigue.miner import damage, format_count, utilisation
+from picchio.fatigue.miner import damage, utilisation
 from picchio.fatigue.shaft_stress import check_shaft
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.fatigue.sn.library import DEFAULT_SN_CURVE, load_sn_curve
@@ -180,7 +181,7 @@ class AllowableLoads(TableResult):
         """Yes, no, or why it cannot be told; then what may be changed."""
         first = self.joints[0]
         sure = "" if first.survival is None else f" at {100 * first.survival:.6g} %"
-        wanted = f"{format_count(first.rivets)} rivets{sure}"
+        wanted = f"{spoken.count(first.rivets)} rivets{sure}"
         stated = all(joint.met for joint in self.joints) and not self.contrary
         if self.held is not None and self.held < SURE and stated:
             start = "No" if self.met is False else "Cannot be told"
@@ -214,8 +215,8 @@ class AllowableLoads(TableResult):
         if math.isinf(self.force_factor):
             return "any"
         if (ends := self.intervals.get("force")) is not None:
-            return f"{told_ends(ends)} N in 80 % of the cases"
-        return f"{told_ends((self.force, self.force))} N"
+            return f"{spoken.between(ends)} N in 80 % of the cases"
+        return f"{spoken.number(self.force)} N"
 
     def _force(self) -> str:
         if math.isinf(self.force_factor):
@@ -227,7 +228,7 @@ class AllowableLoads(TableResult):
         least = min(self.joints, key=lambda joint: joint.force_factor)
         part = "drive" if least.governed_by == "reducer" else "shaft"
         if (ends := self.intervals.get("force")) is not None:
-            return f"The force may be {told_ends(ends)} N in 80 % of the drawn cases."
+            return f"The force may be {spoken.between(ends)} N in 80 % of the drawn cases."
         start = "The" if self.held is None else "At the stated values, which are uncertain, the"
         return (
             f"{start} force may be {self.force_factor:.4g} times as large, {self.force:.4g} N, by "
@@ -275,22 +276,6 @@ class AllowableLoads(TableResult):
                    "least radius [mm]", "least reducer")  # fmt: skip
         facts = {"target life [rivets]": self.joints[0].rivets, "survival": self.joints[0].survival}
         return sheet("Allowable loads", facts, columns, rows, head=self.answer)
-
-
-def told_ends(ends: tuple[float | None, float | None]) -> str:
-    """An interval as people read it.
-
-    Args:
-        ends: P10 and P90; None or inf is unlimited.
-
-    Returns:
-        such as "320 to 610", "320 to no end" or "no end".
-    """
-    low, high = (
-        "no end" if end is None or math.isinf(end) else f"{float(f'{end:.3g}'):,.10g}"
-        for end in ends
-    )
-    return low if low == high else f"{low} to {high}"
 
 
 @one_thread()
@@ -539,7 +524,7 @@ class _Parts:
             assert self.curve is not None
             life = per_pass / self.spent(load, self.curve)
             part = "shaft" if worst == "shaft" else self.joint.drive
-            return f"the {part} of {name} survives {format_count(life)} rivets"
+            return f"the {part} of {name} survives {spoken.count(life)} rivets"
         assert self.ratings is not None
         shares = self.ratings.shares(load.peak, load.held)
         most = max(shares, key=lambda key: shares[key])

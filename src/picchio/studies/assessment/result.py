@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from picchio.core import spoken
 from picchio.core.arrays import FloatArray, TextArray
 from picchio.core.html import sheet
 from picchio.core.results import TableResult
-from picchio.fatigue.miner import format_count as format_count
 from picchio.fatigue.standstill import RISKS, FalseBrinelling
 from picchio.robot.annotations.flexibility import estimate_notice
 from picchio.robot.joint import ESTIMATED_DRIVE
@@ -30,8 +31,6 @@ if TYPE_CHECKING:
 # What an assessment found: the life of every joint, and where it goes.
 
 FORMAT = "picchio-assessment/1"
-# A utilisation below this is rounding, and is told as 0.
-_ROUNDING = 1e-11
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,7 +189,7 @@ class JointLife:
         """The rivets to failure as people read them: an interval where a value has a spread."""
         if self.spread is not None:
             return self.spread.told
-        return format_count(self.rivets_to_failure)
+        return spoken.count(self.rivets_to_failure)
 
     def told_percent(self, key: str) -> str:
         """A utilisation in per cent as people read it: an interval where a value has a spread.
@@ -202,12 +201,7 @@ class JointLife:
             such as "85.2" or "60.1 to 130"; "-" where it is not known.
         """
         value = getattr(self, key)
-        if math.isnan(value):
-            return "-"
-        low, high = self.intervals.get(key, (value, value))
-        if low == high:
-            return f"{100 * value:.4g}" if value > _ROUNDING else "0"
-        return f"{100 * low:.3g} to {100 * high:.3g}"
+        return spoken.between(self.intervals.get(key, (value,)), spoken.per_cent)
 
     def told_interval(self, key: str) -> str:
         """P10 to P90 of a value, its number where it has no spread.
@@ -218,8 +212,8 @@ class JointLife:
         Returns:
             the text.
         """
-        low, high = self.intervals.get(key, (getattr(self, key),) * 2)
-        return f"{low:.3g}" if low == high else f"{low:.3g} to {high:.3g}"
+        ends = self.intervals.get(key, (getattr(self, key),))
+        return spoken.between(ends, partial(spoken.number, least=1e-3))
 
     @property
     def drive(self) -> str:
@@ -416,17 +410,17 @@ class Assessment(TableResult):
         """The joints of a robot whose drives are estimates, as people read them: P10 to P90 only.
 
         Returns:
-            the unit of the torques, and a row a joint: its name, the peak torque of gravity and
-            blows together, its share of the limit and the fatigue used, in %, rivets to failure,
-            and in how many % of the cases it ends the robot's life.
+            the unit of the torques, and a row a joint: its name, rivets to failure, utilisation
+            by peak torque and in fatigue, in %, in how many % of the cases it ends the robot's
+            life, and the peak torque of gravity and blows together.
         """
         joints = self.joints
         load, torques = column([j.units.load for j in joints],
                                [j.told_interval("peak_torque") for j in joints])  # fmt: skip
         return load, [
-            (j.name, torque, j.told_percent("reducer_utilisation"), j.told_percent("utilisation"),
-             j.told_life if j.worn else "unknown",
-             "-" if math.isnan(j.ends_first) else f"{100 * j.ends_first:.0f}")
+            (j.name, j.told_life if j.worn else "unknown", j.told_percent("reducer_utilisation"),
+             j.told_percent("utilisation"),
+             "-" if math.isnan(j.ends_first) else f"{100 * j.ends_first:.0f}", torque)
             for j, torque in zip(joints, torques, strict=True)
         ]  # fmt: skip
 
@@ -451,8 +445,9 @@ class Assessment(TableResult):
         facts = {"method": self.method, "S-N curve": self.sn_curve or None}
         if self.notice:
             load, cells = self.intervals()
-            heads = ["joint", f"peak torque [{load}]", "of its limit [%]", "fatigue: used [%]",
-                     "rivets to failure", "ends first [% of cases]"]  # fmt: skip
+            heads = ["joint", "rivets to failure", "peak torque, of its limit [%]",
+                     "utilisation in fatigue [%]", "ends first [% of cases]",
+                     f"peak torque [{load}]"]  # fmt: skip
             title = f"Assessment of {self.robot}, estimated: P10 to P90"
             return sheet(title, facts, heads, cells, note, f"{self.notice}. {head}")
         joints = self.joints
@@ -473,7 +468,9 @@ class Assessment(TableResult):
                 "rivets to failure": [j.told_life for j in joints],
             }
         if any(j.reducer for j in joints):
-            table["reducer used [%]"] = [j.told_percent("reducer_utilisation") for j in joints]
+            table["reducer utilisation [%]"] = [
+                j.told_percent("reducer_utilisation") for j in joints
+            ]
             table["reducer's limit"] = [j.reducer_governed_by for j in joints]
         rows = zip(*table.values(), strict=True)
         return sheet(f"Assessment of {self.robot}", facts, list(table), rows, note, head)

@@ -223,11 +223,11 @@ class Placement(TableResult):
         )
 
     def _repr_html_(self) -> str:
-        from picchio.studies.assessment.result import format_count
+        from picchio.core import spoken
 
         rows = [
-            (a.name, format_count(a.rivets_to_failure), 100 * a.utilisation,
-             format_count(b.rivets_to_failure), 100 * b.utilisation)
+            (a.name, spoken.count(a.rivets_to_failure), 100 * a.utilisation,
+             spoken.count(b.rivets_to_failure), 100 * b.utilisation)
             for a, b in zip(self.start.joints, self.best.joints, strict=True)
         ]  # fmt: skip
         columns = ("joint", "rivets, now", "utilisation [%]", "rivets, best", "utilisation [%]")

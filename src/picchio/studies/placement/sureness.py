@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from picchio.core import spoken
 from picchio.core.arrays import FloatArray
-from picchio.fatigue.miner import format_count
 from picchio.studies.placement.loads import Loads
 from picchio.studies.placement.search import Spot
 from picchio.studies.placement.work import Work
@@ -180,7 +180,7 @@ def _used(drawn: Drawn, limits: FloatArray | None) -> FloatArray:
 
 def _rounded(value: float) -> str:
     """Two digits: more a few hundred cases do not tell."""
-    return format_count(float(f"{value:.2g}"))
+    return spoken.count(float(f"{value:.2g}"))
 
 
 def _quantiles(values: FloatArray) -> tuple[float, float, float]:

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from picchio.core import spoken
 from picchio.core.arrays import FloatArray
 from picchio.core.html import sheet
 from picchio.core.results import TableResult
-from picchio.fatigue.miner import format_count
 from picchio.fatigue.uncertain_lives import LifeSpread, Uncertain
 from picchio.studies.uncertainty.measurements import Measurement
 
@@ -140,7 +140,7 @@ class UncertainLife(TableResult):
 
     def _repr_html_(self) -> str:
         rows = [
-            (name, *(format_count(s.rounded(key)) for key in s.quantiles), 100 * s.endless)
+            (name, *(spoken.count(s.rounded(key)) for key in s.quantiles), 100 * s.endless)
             for name, s in {**self.joints, "robot": self.robot}.items()
         ]
         columns = ("rivets to failure", "P10", "P50", "P90", "without end [%]")
@@ -148,7 +148,7 @@ class UncertainLife(TableResult):
         return sheet("How sure the life is", facts, columns, rows, head=self._headline())
 
     def _headline(self) -> str:
-        lives = (format_count(self.robot.rounded(key)) for key in self.robot.quantiles)
+        lives = (spoken.count(self.robot.rounded(key)) for key in self.robot.quantiles)
         return "rivets to failure P10 {}, P50 {}, P90 {}".format(*lives)
 
     def _rows(self) -> list[dict[str, Any]]:

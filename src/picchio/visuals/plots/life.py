@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, LogLocator
 
-from picchio.fatigue.miner import format_count
+from picchio.core import spoken
 from picchio.robot.units import labelled
 from picchio.studies.assessment.result import Assessment, JointLife
 from picchio.studies.uncertainty.result import LifeScan, UncertainLife
@@ -239,5 +239,5 @@ def plot_life_scan(name: str, scan: LifeScan, ax: Axes | None = None) -> Axes:
     low, high = ax.get_ylim()
     if high < 50.0 * low:  # less than two decades have too few ticks
         ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: format_count(value)))
+        ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: spoken.count(value)))
     return ax

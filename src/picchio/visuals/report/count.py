@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from picchio.ledger.result import Count, told_blows, told_interval, told_share
+from picchio.core import spoken
+from picchio.ledger.result import Count
 from picchio.visuals.plots.style import blank_figure, look, styled
 from picchio.visuals.report.page import Picture, Pictures, render
 
@@ -35,15 +36,16 @@ def count_page(found: Count, *, command: str | None = None, warnings: Sequence[s
     for joint in joints:
         left = joint["blows_left"]
         rows.append([
-            joint["name"], told_share(joint["damage"]), told_interval(joint["damage_interval"]),
-            *("-" if left is None else told_blows(left[p]) for p in ("p10", "p50", "p90")),
+            joint["name"], spoken.per_cent(joint["damage"]),
+            spoken.between(joint["damage_interval"] or [None], spoken.per_cent),
+            *("-" if left is None else spoken.count(left[p]) for p in ("p10", "p50", "p90")),
             found.reached(left) or "-",
         ])  # fmt: skip
     first = found.first_to_fail
     places = [
         [", ".join(f"{v:.3f}" for v in s["pose"]),
          ", ".join(f"{v:.2f}" for v in np.round(s["direction"], 2) + 0.0),
-         s["blows"], *(told_share(v) for v in s["share"])]
+         s["blows"], *(spoken.per_cent(v) for v in s["share"])]
         for s in found.stations()
     ]  # fmt: skip
     facts: list[list[Any]] = [

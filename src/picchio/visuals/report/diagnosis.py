@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
+from picchio.core import spoken
 from picchio.core.provenance import provenance
 from picchio.diagnosis.life import matters
 from picchio.diagnosis.motion.conclude.during_blows import BlowEffects, MotionLife
@@ -20,7 +21,6 @@ from picchio.diagnosis.percussion.follow_up.records import when
 from picchio.diagnosis.result import Cause, Diagnosis, Value, differences, in_tolerances, in_words
 from picchio.model.effects.registry import catalogue
 from picchio.robot.flexible_robot import FlexibleRobot
-from picchio.studies.assessment.result import format_count
 from picchio.visuals.plots.diagnosis import place_in_words
 from picchio.visuals.plots.style import direction_label
 from picchio.visuals.report.motion_figures import MotionFigures
@@ -427,7 +427,7 @@ def _life_cell(key: str, value: Any, given: bool = True) -> str:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return str(value)
     if "rivets" in key:
-        return format_count(float(value))
+        return spoken.count(float(value))
     return percent(value) if key.startswith("utilisation") else number(float(value))
 
 

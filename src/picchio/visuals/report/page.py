@@ -16,11 +16,11 @@ import matplotlib as mpl
 from markupsafe import Markup, escape
 from matplotlib.axes import Axes
 
+from picchio.core import spoken
 from picchio.core.errors import InputError
 from picchio.core.html import Page, unfolded
 from picchio.core.provenance import package_version
 from picchio.core.results import Result
-from picchio.studies.assessment.result import format_count
 from picchio.visuals.plots.style import BLUE, INK, MUTED, STYLE, VERMILION
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ def page_environment(package: str = "picchio.visuals.report") -> Environment:
         lstrip_blocks=True,
         loader=PackageLoader(package, "page_files"),
     )
-    environment.filters.update(number=number, percent=percent, count=format_count)
+    environment.filters.update(number=number, percent=percent, count=spoken.count)
     style = files("picchio.visuals.report") / "page_files" / "style.css"
     environment.globals["style"] = Markup(style.read_text("utf-8"))
     return environment
@@ -133,25 +133,17 @@ class Pictures:
         return Picture(inline_svg(ax, alt, f"{self.PREFIX}{self._made}", themed=True), caption)
 
 
-_ROUNDING = 1e-9  # what is smaller, in any unit that a page uses, is rounding
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def number(value: float | None, digits: int = 4) -> str:
-    """A number with few digits; a dash where there is none."""
-    if value is None or math.isnan(value):
+def number(value: float | None, digits: int = spoken.DIGITS) -> str:
+    """A number as on a terminal, with a true minus, a true dash and raised powers of ten."""
+    text = spoken.number(value, digits)
+    if text == "-":
         return "\N{EN DASH}"
-    if math.isinf(value):
-        return "no end"
-    if abs(value) < _ROUNDING:
-        return "0"
-    text = f"{value:.{digits}g}".replace("-", "\N{MINUS SIGN}")
-    mantissa, e, power = text.partition("e")
-    if not e:
-        return text
-    sign = "-" if power.startswith("\N{MINUS SIGN}") else ""
-    exponent = f"{sign}{int(power.lstrip('+' + chr(0x2212)))}"
-    return f"{mantissa} × 10{exponent.translate(_RAISED)}"
+    mantissa, e, power = text.partition("e") if text[-1].isdigit() else (text, "", "")
+    raised = f" × 10{power.translate(_RAISED)}" if e else ""
+    return mantissa.replace("-", "\N{MINUS SIGN}") + raised
 
 
 def signed(value: float, places: int) -> str:

@@ -32,7 +32,7 @@ def check_page(
     *,
     command: str | None = None,
     warnings: Sequence[str] = (),
-    gravity_stiffness: bool = True,
+    gravity_stiffness: bool | None = None,
 ) -> str:
     """How the nominal simulation differs from a campaign's records, percussion and motion.
 
@@ -86,7 +86,8 @@ def check_page(
         moves = render("residual_motion.html.j2", **shown)
     if not part:
         return moves
-    left = percussion_residual(robot, campaign, gravity_stiffness=gravity_stiffness)
+    added = robot.adds_gravity(gravity_stiffness, usual=True)
+    left = percussion_residual(robot, campaign, gravity_stiffness=added)
     return render("residual.html.j2", **page, **_percussion(left), moves=Markup(moves))
 
 

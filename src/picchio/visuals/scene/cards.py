@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from picchio.fatigue.miner import format_count
+from picchio.core import spoken
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.assessment.result import Assessment, OperationResult
 from picchio.studies.envelopes import DirectionEnvelope
@@ -87,7 +87,7 @@ def rivet_card(assessment: Assessment, operation: OperationResult, i: int) -> li
                     for o in assessment.operations)  # fmt: skip
         share = 100.0 * damage[j] * operation.rivets / spent
         rows.append(("damage", f"{damage[j]:.3g} a rivet, in {names[j]}", ""))
-        rows.append(("alone it would last", f"{format_count(1.0 / damage[j])} rivets", ""))
+        rows.append(("alone it would last", f"{spoken.count(1.0 / damage[j])} rivets", ""))
         rows.append(("share", f"{share:.3g} % of the damage of {names[j]} on this task", ""))
     elif np.isfinite(damage).any():
         rows.append(("damage", "none: below the endurance limit", ""))

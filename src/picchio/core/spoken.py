@@ -1,0 +1,79 @@
+"""Numbers as an engineer says them: the one place where a number becomes text for people."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+DIGITS = 3  # more than these the physics does not deserve
+UNLIMITED = "unlimited"  # a life below the endurance limit, or whatever else nothing bounds
+_ROUNDING = 1e-9  # in any unit that is printed, less than this is rounding
+_GROUPED = 1e9  # from here on a power of ten is easier to read than groups of digits
+
+
+def number(value: float | None, digits: int = DIGITS, least: float = _ROUNDING) -> str:
+    """A number of any quantity.
+
+    Args:
+        value: inf is "unlimited"; None and NaN are a dash.
+        digits: that count.
+        least: what is smaller is "about 0".
+
+    Returns:
+        such as "0.0412", "12,300" or "4.1e9".
+    """
+    if value is None or math.isnan(value):
+        return "-"
+    if math.isinf(value):
+        return UNLIMITED
+    if abs(value) < least:
+        return "about 0" if value else "0"
+    rounded = float(f"{value:.{digits}g}")
+    if 1e3 <= abs(rounded) < _GROUPED:
+        return f"{rounded:,.0f}" if abs(rounded) >= 10 ** (digits - 1) else f"{rounded:,g}"
+    mantissa, e, power = f"{rounded:.{digits}g}".partition("e")
+    return mantissa + (f"e{int(power)}" if e else "")
+
+
+def count(value: float | None, digits: int = DIGITS) -> str:
+    """A number of rivets or blows: "< 1" and "> 1e9" beyond what anybody needs to know.
+
+    Args:
+        value: as in `number`.
+        digits: that count.
+    """
+    if value is not None and 0.0 < value < 1.0:
+        return "< 1"
+    return "> 1e9" if value is not None and _GROUPED < value < math.inf else number(value, digits)
+
+
+def per_cent(share: float | None, digits: int = DIGITS) -> str:
+    """A share, 1 being all, in per cent without its sign; below 0.001 % it is about 0.
+
+    Args:
+        share: as in `number`.
+        digits: that count.
+    """
+    return number(None if share is None else 100.0 * share, digits, 1e-3)
+
+
+def between(ends: Sequence[float | None], tell: Callable[..., str] = number) -> str:
+    """An interval; one number where both ends read alike.
+
+    Args:
+        ends: low and high.
+        tell: writes each.
+    """
+    return " to ".join(dict.fromkeys(map(tell, ends)))
+
+
+def factor(decades: float) -> str:
+    """How far apart the ends of an interval are.
+
+    Args:
+        decades: powers of ten from end to end.
+
+    Returns:
+        such as "a factor 22".
+    """
+    return f"a factor {number(10.0**decades, 2)}"
