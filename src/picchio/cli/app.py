@@ -38,7 +38,7 @@ class _Command(TyperCommand):
     def format_options(self, context: Any, formatter: Any) -> None:
         """Arguments, the options of the examples, then the others in groups."""
         used = set(re.findall(r"(?<= )--?[a-z][a-z-]*", self.epilog or ""))
-        titles = ("Arguments", "Options used most", "More options")
+        titles = ("Arguments", "Options used most", BLOWS, ROBOT, OUTPUT, "More options")
         groups: dict[str, list[Any]] = {title: [] for title in titles}
         for param in self.get_params(context):
             record = param.get_help_record(context)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from picchio.cli.app import BLOWS, OUTPUT, ROBOT
 from picchio.cli.output import folder_to_write, to_write
 from picchio.core.errors import InputError
 
@@ -25,7 +27,7 @@ def output(key: str, metavar: str, help: str, *endings: str, **how: bool) -> Any
     def named(text: str) -> Path:
         return to_write(text, key, endings, **how)
 
-    return typer.Option(key, metavar=metavar, help=help, parser=named)
+    return typer.Option(key, metavar=metavar, help=help, parser=named, rich_help_panel=OUTPUT)
 
 
 def folder(key: str, metavar: str, help: str) -> Any:
@@ -40,7 +42,7 @@ def folder(key: str, metavar: str, help: str) -> Any:
     def named(text: str) -> Path:
         return folder_to_write(text, key)
 
-    return typer.Option(key, metavar=metavar, help=help, parser=named)
+    return typer.Option(key, metavar=metavar, help=help, parser=named, rich_help_panel=OUTPUT)
 
 
 def _json(text: str) -> str:
@@ -50,9 +52,46 @@ def _json(text: str) -> str:
 PAGES = (".html", ".htm")
 PICTURES = (".png", ".svg", ".pdf")
 
+
+def robot_names() -> list[str]:
+    """For the shell: robots that can be named."""
+    from picchio.robot.loading.find import example_robots, shipped_robots
+
+    return [*shipped_robots(), *example_robots()]
+
+
+def out_beside(name: str, ending: str) -> Path:
+    """What `--out` is where it is not given: the robot's name with an ending, in this folder.
+
+    Args:
+        name: of the robot.
+        ending: such as "-map.nc".
+    """
+    return to_write(re.sub(r"[^\w-]", "_", name) + ending, "--out")
+
+
+def curve_names() -> list[str]:
+    """For the shell: S-N curves that can be named."""
+    from picchio.fatigue.sn.library import sn_curve_names
+
+    return list(sn_curve_names())
+
+
+def joint_names(ctx: typer.Context) -> list[str]:
+    """For the shell: flexible joints of the robot that was typed before.
+
+    Args:
+        ctx: what was typed.
+    """
+    from picchio.robot.loading.load import load_robot
+
+    return list(load_robot(ctx.params["robot"]).flexible_names) if ctx.params.get("robot") else []
+
+
 RobotArgument = Annotated[
     str,
     typer.Argument(
+        autocompletion=robot_names,
         metavar="ROBOT",
         help="A name from `picchio robots`, a URDF, or a saved model (picchio-model/1).",
     ),
@@ -62,6 +101,7 @@ FlexOption = Annotated[
     typer.Option(
         metavar="FILE",
         help="Sidecar (TOML) with stiffness, damping and shafts; the robot's own if not given.",
+        rich_help_panel=ROBOT,
     ),
 ]
 ToolOption = Annotated[
@@ -69,6 +109,7 @@ ToolOption = Annotated[
     typer.Option(
         metavar="FRAME",
         help="Frame of the URDF on which the tool's force acts; the sidecar's if not given.",
+        rich_help_panel=ROBOT,
     ),
 ]
 ReducersOption = Annotated[
@@ -77,6 +118,7 @@ ReducersOption = Annotated[
         metavar="FILE",
         help="Catalogue of reducers (TOML, see `picchio formats reducers`), stronger than those "
         "shipped; may be repeated.",
+        rich_help_panel=ROBOT,
     ),
 ]
 TaskOption = Annotated[
@@ -85,14 +127,18 @@ TaskOption = Annotated[
         metavar="FILE",
         help="What the robot does (TOML, see `picchio formats task`); its example task if not "
         "given, else one that is printed first.",
+        rich_help_panel=BLOWS,
     ),
 ]
 PayloadOption = Annotated[
     float | None,
-    typer.Option(metavar="KG", help="Rated payload; narrows the estimates."),
+    typer.Option(metavar="KG", help="Rated payload; narrows the estimates.", rich_help_panel=ROBOT),
 ]
 ReachOption = Annotated[
-    float | None, typer.Option(metavar="M", help="Rated reach; what the URDF says if not given.")
+    float | None,
+    typer.Option(
+        metavar="M", help="Rated reach; what the URDF says if not given.", rich_help_panel=ROBOT
+    ),
 ]
 ClassOption = Annotated[
     str | None,
@@ -100,28 +146,38 @@ ClassOption = Annotated[
         "--class",
         metavar="CLASS",
         help="Of the drives: strain-wave, cycloidal, planetary, direct or ball-screw.",
+        rich_help_panel=ROBOT,
     ),
 ]
 SNCurveOption = Annotated[
     str | None,
     typer.Option(
+        autocompletion=curve_names,
         metavar="NAME",
         help="S-N curve of all shafts: a name or a TOML file; each shaft's own if not given.",
+        rich_help_panel=ROBOT,
     ),
 ]
 ForceOption = Annotated[
-    float | None, typer.Option(help="Peak force of one blow, N; the example task's if not given.")
+    float | None,
+    typer.Option(
+        help="Peak force of one blow, N; the example task's if not given.", rich_help_panel=BLOWS
+    ),
 ]
 PeriodOption = Annotated[
-    float | None, typer.Option(help="Time from one blow to the next, s; likewise.")
+    float | None,
+    typer.Option(help="Time from one blow to the next, s; likewise.", rich_help_panel=BLOWS),
 ]
-WidthOption = Annotated[float | None, typer.Option(help="Duration of a blow, s; likewise.")]
+WidthOption = Annotated[
+    float | None, typer.Option(help="Duration of a blow, s; likewise.", rich_help_panel=BLOWS)
+]
 HitsOption = Annotated[
     int | None,
     typer.Option(
         metavar="N",
         min=1,
         help="Blows of a burst from rest, at most 10000; steady state if not given.",
+        rich_help_panel=BLOWS,
     ),
 ]
 DataOption = Annotated[
@@ -132,7 +188,12 @@ ReportOption = Annotated[
 ]
 JsonOption = Annotated[
     str | None,
-    typer.Option(metavar="FILE", help="Write the result as JSON; - for stdout.", parser=_json),
+    typer.Option(
+        metavar="FILE",
+        help="Write the result as JSON; - for stdout.",
+        parser=_json,
+        rich_help_panel=OUTPUT,
+    ),
 ]
 GravityStiffnessOption = Annotated[
     bool | None,
@@ -140,6 +201,7 @@ GravityStiffnessOption = Annotated[
         "--gravity-stiffness/--no-gravity-stiffness",
         help="Whether gravity's stiffness dg/dq is added to that of the springs; of a saved model "
         "what its fit assumed.",
+        rich_help_panel=ROBOT,
     ),
 ]
 

@@ -309,6 +309,8 @@ def _answer(show: Callable[[], object]) -> None:
         if isinstance(first, FittedTable):
             first, less = first.brief(screen, room)
             cut |= less
+            if len(first.heads) == 1:  # names alone say nothing
+                break
         with screen.capture() as text:
             screen.print(first, *rest, **options)
         made = text.get().splitlines()

@@ -166,7 +166,7 @@ class Comparison(Result):
         judged = [item for item in self.items if item.verdict]
         if len(judged) < 2:
             return ""
-        told = ", ".join(f"{i.name} {str(i.verdict['status']).replace('-', ' ')}" for i in judged)
+        told = ", ".join(f"{i.name}: {_word(i.verdict)}" for i in judged)
         margins = {i.name: i.verdict.get("margin") for i in judged}
         known = {name: margin for name, margin in margins.items() if _number(margin)}
         if len(known) < len(judged) or len(set(known.values())) == 1:
@@ -397,6 +397,11 @@ def _unit(key: str, side: Mapping[str, Any]) -> str:
     unit = _UNITS.get(last, "")
     kind = side.get(f"{before}.kind")
     return units_of(kind).of(unit) if unit and kind in ("revolute", "prismatic") else unit
+
+
+def _word(verdict: Mapping[str, Any]) -> str:
+    """A verdict in a word or two, as its headline begins."""
+    return str(verdict.get("headline") or verdict["status"]).partition(".")[0].lower()
 
 
 def _number(value: Any) -> bool:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import typer
 
-from picchio.cli.app import app
+from picchio.cli.app import app, examples
 from picchio.cli.options import (
     POSE_HELP,
     FlexOption,
@@ -23,16 +23,28 @@ from picchio.cli.options import (
     pose_given,
 )
 from picchio.cli.output import console, deliver, styled, table
+from picchio.core import spoken
 
 if TYPE_CHECKING:
     from picchio.core.arrays import FloatArray
     from picchio.studies.envelopes import DirectionEnvelope
 
 
-@app.command(epilog="Example: picchio envelope fanuc_like_3dof --pose=0.3,1.1,-1.0")
+@app.command(
+    epilog=examples(
+        "envelope fanuc_like_3dof",
+        "envelope fanuc_like_3dof --pose=0.3,1.1,-1.0 --hits 12",
+        "envelope ur10 --pose=home --force 500 --json envelope.json",
+    )
+)
 def envelope(
     robot: RobotArgument,
-    pose: Annotated[str, typer.Option(metavar="Q1,Q2,...", help=POSE_HELP)],
+    pose: Annotated[
+        str | None,
+        typer.Option(
+            metavar="Q1,Q2,...", help=f"{POSE_HELP} The first of the robot's task if not given."
+        ),
+    ] = None,
     force: ForceOption = None,
     period: PeriodOption = None,
     width: WidthOption = None,
@@ -49,20 +61,21 @@ def envelope(
     """
     import picchio
     from picchio.robot.dynamics.pose import warn_beyond_limits
+    from picchio.studies.default_task import task_of
     from picchio.studies.tasks import blows_of
 
     loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
     blows = blows_of(loaded, force=force, period=period, width=width)
-    at = loaded.pose(pose_given(pose))
+    at = loaded.pose(pose_given(pose)) if pose else task_of(loaded).operations[0].poses[0]
     warn_beyond_limits(loaded, [at], "the pose")
     found = picchio.envelope(loaded, at, blows, hits=hits, gravity_stiffness=gravity_stiffness)
     deliver(found.to_dict(), json, lambda: _show(found))
 
 
-def _told(values: FloatArray, ends: FloatArray, digits: int) -> list[str]:
+def _told(values: FloatArray, ends: FloatArray) -> list[str]:
     """Numbers as people read them, as intervals where they are estimates."""
     return [
-        f"{value:.{digits}g}" if low == high else f"{low:.3g} to {high:.3g}"
+        spoken.number(value) if low == high else spoken.between((low, high))
         for value, (low, high) in zip(values, ends, strict=True)
     ]
 
@@ -72,23 +85,23 @@ def _show(found: DirectionEnvelope) -> None:
     from picchio.vibration.closed_form.response import described
 
     out = console()
-    pose = ", ".join(f"{q:g}" for q in found.pose)
+    pose = ", ".join(map(spoken.number, found.pose))
     how = described(found.hits)
     out.print(styled(found.robot, f" at ({pose}), {how}"))
     out.print(f"  {found.excitation.describe()}")
-    frequencies = ", ".join(f"{f:.4f}" for f in found.natural_frequencies)
+    frequencies = ", ".join(map(spoken.number, found.natural_frequencies))
     out.print(f"  natural frequencies {frequencies} Hz\n")
     stresses = found.peak("stress") / 1e6
     small, peaks = column([u.small for u in found.units],
-                          _told(1e3 * found.peak(), 1e3 * found.peak_interval(), 5))  # fmt: skip
-    told = _told(found.peak("torque"), found.peak_interval("torque"), 4)
+                          _told(1e3 * found.peak(), 1e3 * found.peak_interval()))  # fmt: skip
+    told = _told(found.peak("torque"), found.peak_interval("torque"))
     load, torques = column([u.load for u in found.units], told)
     rows = [
         (
             name,
             peaks[j],
             torques[j],
-            "-" if np.isnan(stresses[j]) else f"{stresses[j]:.4g}",
+            "-" if np.isnan(stresses[j]) else spoken.number(stresses[j]),
             ", ".join(f"{c + 0.0:.3f}" for c in found.worst_direction[j].round(9)),
         )
         for j, name in enumerate(found.joint_names)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from picchio.cli.app import app
+from picchio.cli.app import app, examples
 from picchio.cli.options import (
     PAGES,
     PICTURES,
@@ -21,6 +21,7 @@ from picchio.cli.options import (
     ToolOption,
     WidthOption,
     numbers,
+    out_beside,
     output,
 )
 from picchio.cli.output import (
@@ -32,6 +33,7 @@ from picchio.cli.output import (
     table,
     telling,
 )
+from picchio.core import spoken
 from picchio.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -42,11 +44,19 @@ if TYPE_CHECKING:
 
 
 @app.command(
-    "map", epilog="Example: picchio map fanuc_like_3dof --plane xz --spacing 0.1 --out map.nc"
+    "map",
+    epilog=examples(
+        "map fanuc_like_3dof",
+        "map fanuc_like_3dof --plane xz --spacing 0.1 --out map.nc --plot map.png",
+        "map ur10 --box --spacing 0.2 --html map.html",
+    ),
 )
 def map_(
     robot: RobotArgument,
-    out: Annotated[Path, output("--out", "FILE", "map.nc (netCDF) or map.zarr (Zarr).")],
+    out: Annotated[
+        Path | None,
+        output("--out", "FILE", "map.nc (netCDF) or map.zarr (Zarr); ROBOT-map.nc if not given."),
+    ] = None,
     plane: Annotated[
         str | None,
         typer.Option(metavar="PLANE", help="Points on a plane: xy, xz or yz; the default is xz."),
@@ -153,6 +163,7 @@ def map_(
 
     with notice_first(json):
         loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
+    out = out or out_beside(loaded.name, "-map.nc")
     where = _places(loaded, plane, at, box, points, surface, joint_grid, spacing, bounds)
     if direction is None:
         direction = "worst" if surface is None else "normal"
@@ -267,9 +278,9 @@ def _show(summary: dict[str, Any]) -> None:
 
     def told(joint: dict[str, Any], key: str, scale: float) -> str:
         if "estimate" not in joint:
-            return f"{scale * joint[key]:.4g}"
+            return spoken.number(scale * joint[key])
         ends = joint["estimate"][key]
-        return f"{scale * ends['P10']:.3g} to {scale * ends['P90']:.3g}"
+        return spoken.between((scale * ends["P10"], scale * ends["P90"]))
 
     small, peaks = column(
         [u.small for u in units],
@@ -292,11 +303,13 @@ def _show(summary: dict[str, Any]) -> None:
             joint["name"],
             peaks[k],
             torques[k],
-            *(["-" if stress is None else f"{stress / 1e6:.4g}"] if stressed else []),
+            *(["-" if stress is None else spoken.number(stress / 1e6)] if stressed else []),
             ", ".join(f"{round(c, 3) + 0.0:.3f}" for c in joint.get("estimate", joint)["position"]),
             f"{100 * joint['limits_poses'] / summary['poses']:.1f}",
         ]
-        rows.append([*cells, "-" if damage is None else f"{damage:.3g}"][: len(heads)])
+        rows.append(
+            [*cells, "-" if damage is None else spoken.number(damage, least=0.0)][: len(heads)]
+        )
     title = "P10 to P90, where P90 is largest" if "estimate" in summary["joints"][0] else None
     out.print(table(heads, rows, title=title))
     if counted:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from picchio.cli.app import app
+from picchio.cli.app import app, examples
 from picchio.cli.ending import ending
 from picchio.cli.options import (
     PAGES,
@@ -22,6 +22,8 @@ from picchio.cli.options import (
     TaskOption,
     ToolOption,
     WidthOption,
+    joint_names,
+    out_beside,
     output,
     pose_given,
 )
@@ -32,10 +34,19 @@ if TYPE_CHECKING:
     from picchio.visuals.scene.scene import Scene
 
 
-@app.command(epilog="Example: picchio view fanuc_like_3dof --out scene.html")
+@app.command(
+    epilog=examples(
+        "view fanuc_like_3dof",
+        "view ur10 --task task.toml --out scene.html",
+        "view ur10 --pose=0,-1,1,0,0,0 --joint elbow_joint",
+    )
+)
 def view(
     robot: RobotArgument,
-    out: Annotated[Path | None, output("--out", "FILE", "Where the HTML goes.", *PAGES)] = None,
+    out: Annotated[
+        Path | None,
+        output("--out", "FILE", "Where the HTML goes; ROBOT-scene.html if not given.", *PAGES),
+    ] = None,
     rerun: Annotated[
         Path | None,
         output(
@@ -74,7 +85,12 @@ def view(
         ),
     ] = None,
     joint: Annotated[
-        str | None, typer.Option(metavar="NAME", help="The joint whose envelope is shown first.")
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="The joint whose envelope is shown first.",
+            autocompletion=joint_names,
+        ),
     ] = None,
     flex: FlexOption = None,
     tool: ToolOption = None,
@@ -89,9 +105,9 @@ def view(
     import picchio
     from picchio.studies.tasks import blows_of
 
-    if out is None and rerun is None and not live:
-        raise InputError("needs a file", key="--out", hint="--out scene.html, or --live")
     loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
+    if out is None and rerun is None and not live:
+        out = out_beside(loaded.name, "-scene.html")
     blows = None
     if pose is not None:
         blows = blows_of(loaded, task, force=force, period=period, width=width)

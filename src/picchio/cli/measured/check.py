@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import typer
 
-from picchio.cli.app import app
+from picchio.cli.app import app, examples
 from picchio.cli.options import (
     FlexOption,
     GravityStiffnessOption,
@@ -40,7 +40,11 @@ _STYLES = {"error": "bold red", "warning": "yellow", "note": "dim"}
 
 
 @app.command(
-    epilog="Example: picchio check measurements/ --robot fanuc_like_3dof --json check.json"
+    epilog=examples(
+        "check measurements/",
+        "check measurements/ --robot ur10 --report check.html",
+        "check measurements/ --keep-going --json check.json",
+    )
 )
 def check(
     campaign: Annotated[

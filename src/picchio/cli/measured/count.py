@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import typer
 
-from picchio.cli.app import app
+from picchio.cli.app import app, examples
 from picchio.cli.options import (
     FlexOption,
     JsonOption,
@@ -47,8 +47,11 @@ if TYPE_CHECKING:
 
 
 @app.command(
-    epilog="Example: picchio count fanuc_like_3dof --log logs --ledger cell4.ledger "
-    "--report life.html"
+    epilog=examples(
+        "count fanuc_like_3dof --log logs --ledger cell4.ledger",
+        "count ur10 --log logs --ledger cell4.ledger --task task.toml --report life.html",
+        "count ur10 --log logs --ledger cell4.ledger --watch --hours-per-day 16",
+    )
 )
 def count(
     robot: RobotArgument,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from picchio.cli.app import app
+from picchio.cli.app import app, examples
 from picchio.cli.options import (
     DataOption,
     FlexOption,
@@ -40,7 +40,11 @@ if TYPE_CHECKING:
 
 
 @app.command(
-    epilog="Example: picchio diagnose fanuc_like_3dof --data measurements/ --report why.html"
+    epilog=examples(
+        "diagnose fanuc_like_3dof --data measurements/",
+        "diagnose ur10 --data measurements/ --report why.html --model extended.toml",
+        "diagnose ur10 --data measurements/ --task task.toml --plan next.toml",
+    )
 )
 def diagnose(
     robot: RobotArgument,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from picchio.cli.app import app
+from picchio.cli.app import app, examples
 from picchio.cli.options import (
     DataOption,
     FlexOption,
@@ -32,8 +32,11 @@ if TYPE_CHECKING:
 
 
 @app.command(
-    epilog="Example: picchio identify kuka_kr300_r2500 --data motions/ --out identified.toml, "
-    "then picchio assess kuka_kr300_r2500 --flex identified.toml"
+    epilog=examples(
+        "identify kuka_kr300_r2500 --data motions/ --out identified.toml",
+        "identify ur10 --data loads/ --out ur10.flex.toml --report stiffness.html",
+        "assess kuka_kr300_r2500 --flex identified.toml",
+    )
 )
 def identify(
     robot: RobotArgument,

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from picchio.cli.app import app
+from picchio.cli.app import app, examples
 from picchio.cli.options import JsonOption, folder, output
 from picchio.cli.output import console, deliver
 from picchio.core.errors import InputError
@@ -15,8 +15,11 @@ from picchio.core.errors import InputError
 
 @app.command(
     "import",
-    epilog="Example: picchio import run.mcap --write-mapping mapping.toml, edit it, then "
-    "picchio import run.mcap --mapping mapping.toml --to campaign",
+    epilog=examples(
+        "import run.mcap",
+        "import run.mcap --write-mapping mapping.toml --robot ur10",
+        "import run.mcap --mapping mapping.toml --to campaign",
+    ),
 )
 def import_(
     file: Annotated[

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from picchio.cli.app import app
+from picchio.cli.app import app, examples
 from picchio.cli.options import (
     FlexOption,
     JsonOption,
@@ -34,7 +34,11 @@ if TYPE_CHECKING:
 
 
 @app.command(
-    epilog="Example: picchio plan fanuc_r2000ic --budget 20min --with dial,scale --to loads"
+    epilog=examples(
+        "plan fanuc_r2000ic --budget 20min --with dial,scale",
+        "plan fanuc_r2000ic --budget 1h --with hammer,accelerometer --to taps",
+        "plan ur10 --task task.toml --flex known.toml --to loads",
+    )
 )
 def plan(
     robot: RobotArgument,

@@ -29,7 +29,13 @@ def robots(
     deliver(found.to_dict(), json, lambda: _show(found))
 
 
-@app.command(epilog="Example: picchio annotate ur10 --flex my_ur10.toml --out robot.urdf")
+@app.command(
+    epilog=examples(
+        "annotate ur10 --out robot.urdf",
+        "annotate ur10 --flex my_ur10.toml --out robot.urdf",
+        "annotate arm.urdf --flex arm.flex.toml --out robot.urdf",
+    )
+)
 def annotate(
     robot: RobotArgument,
     out: Annotated[Path, output("--out", "FILE", "Where the URDF goes.")],
