@@ -75,7 +75,7 @@ def compare(name: str) -> dict[str, Any]:
 
 
 def count(number: float) -> str:
-    return "no end" if math.isinf(number) else "-" if math.isnan(number) else f"{number:.4g}"
+    return "unlimited" if math.isinf(number) else "-" if math.isnan(number) else f"{number:.4g}"
 
 
 def show(row: dict[str, Any]) -> None:

@@ -200,7 +200,7 @@ def test_what_a_slide_bears_is_estimated_from_its_effort_limit(capsys):
     assert run(["assess", "emps"]) == 0
     said = told(capsys)
     assert said.startswith("Estimated: nobody measured the strength of the drives of emps")
-    assert "no end" in said and "%" in said
+    assert "unlimited" in said and "%" in said
     assert "what the drive of slide bears, from its maker" in said and "--reducer" not in said
     robot = picchio.load_robot("emps")
     (joint,) = robot.flexible_joints

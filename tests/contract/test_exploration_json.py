@@ -28,5 +28,5 @@ def test_the_state_on_the_screen_has_its_keys(name: str) -> None:
     assert len(model["natural_frequencies"]) == len(model["joints"])
     for joint in model["joints"]:
         assert set(joint) >= JOINT
-        assert joint["life"] is None or joint["life"] == "no end" or joint["life"] > 0.0
+        assert joint["life"] is None or joint["life"] == "unlimited" or joint["life"] > 0.0
     assert {"kind", "force", "period", "width", "hits"} <= set(content["blows"])

@@ -112,7 +112,7 @@ def test_an_estimate_is_no_lone_number():
     guess = {"format": "picchio-x/1", "rivets_to_failure": 4e4, "estimated": True, "life": life}
     sure = {"format": "picchio-x/1", "rivets_to_failure": 5e4}
     rows = {row.key: row.shown for row in picchio.compare(guess, sure).results}
-    assert rows["rivets_to_failure"] == ("2,000 to no end", "50,000")
+    assert rows["rivets_to_failure"] == ("2,000 to unlimited", "50,000")
 
 
 def test_a_slide_has_the_units_of_a_slide():

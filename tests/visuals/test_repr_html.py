@@ -52,7 +52,7 @@ def test_a_robot_shows_its_joints(arm: SimpleNamespace) -> None:
 
 def test_an_assessment_shows_verdict_and_lives(arm: SimpleNamespace) -> None:
     *_, joints = tables(arm.assessment)
-    assert column(joints, "rivets") == ["no end"] * 3
+    assert column(joints, "rivets") == ["unlimited"] * 3
     told = [float(c) for c in column(joints, "peak deflection")]
     np.testing.assert_allclose(told, [1e3 * j.peak_deflection for j in arm.assessment.joints], 1e-3)
     assert "joint_2" in seen(arm.assessment)

@@ -105,7 +105,7 @@ def life_before_and_after(
 
     Returns:
         {"baseline": {...}, "extended": {...}}, each with rivets_to_failure (infinite where there
-        is no end), utilisation (of the joint that has most), limiting_joint, and every joint's
+        is unlimited), utilisation (of the joint that has most), limiting_joint, and every joint's
         rivets_to_failure, utilisation and peak_deflection (rad). With a spread there are
         rivets_interval and utilisation_interval, too, of the robot and of every joint: two-sided,
         `LEVEL`, of what the model leaves open; how strong the material is, is not in them. With
@@ -246,7 +246,7 @@ def life_intervals(
 
     Returns:
         joint -> {"rivets_interval": (low, high), "utilisation_interval": (low, high)}, of joints
-        with an S-N curve; a life without end is infinite.
+        with an S-N curve; an unlimited life is infinite.
 
     Raises:
         InputError: as `assess`.

@@ -14,7 +14,7 @@ by what drives and encoders read. What the two share are the causes that change 
 - Values that disagree, or a cause that the other kind's records rule out, are a contradiction:
   then nothing is claimed, and the note says what contradicts what.
 
-A motor that stands still while the tool hits hides its rotor's inertia and the friction on its
+A motor that is locked while the tool hits hides its rotor's inertia and the friction on its
 side of the gear from percussion records: a motion may show more of these than blows do.
 """
 

@@ -31,7 +31,7 @@ class Excitation(ABC):
         programmed: whether numbers alone state it, so that a plan may ask for it. A force that
             was measured is known only afterwards.
         flat: whether a blow stays at its peak for most of its width.
-        force: N, height or peak as stated; None where the kind states none.
+        force: N, peak as stated; None where the kind states none.
         period: s, from one blow to the next.
         width: s, how long a blow lasts as stated; None where the kind states none.
         preload: N, steady feed force along the same direction; it is there before the first

@@ -22,7 +22,7 @@ class Train(Excitation):
 
     Attributes:
         words: how one blow is described, with `force` in braces.
-        force: N, height of a pulse or peak of a blow, F0.
+        force: N, peak of a pulse or blow, F0.
         period: s, T.
         width: s, T_d, less than the period.
         preload: N, steady feed force.

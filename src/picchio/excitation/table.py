@@ -51,7 +51,7 @@ class ExcitationTable(StrictModel):
 
     Attributes:
         kind: shape of the blows; "pulse_train" (rectangular) where no table gives one.
-        force: N, height of a pulse or peak of a half-sine.
+        force: N, peak of a pulse or half-sine.
         period: s, from the start of one blow to the start of the next.
         width: s, duration of one blow.
         preload: N, steady feed force along the direction.

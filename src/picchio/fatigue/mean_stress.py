@@ -141,7 +141,7 @@ def fkm_sensitivity(tensile_strength: float) -> float:
 def _fkm(a: FloatArray, m: FloatArray, sensitivity: float) -> FloatArray:
     """FKM's fields II (R <= 0), III (0 < R < 0.5) and IV (R >= 0.5), continuous in between.
 
-    II and III are pyLife's `fkm_goodman`; that IV is constant is from memory, unverified.
+    II and III are pyLife's `fkm_goodman`; IV constant: engineering assumption, no source.
     """
     big = sensitivity
     alternating = a + big * m

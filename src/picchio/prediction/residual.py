@@ -151,7 +151,7 @@ class ChannelResidual:
         record, channel, group: names.
         pose: number of the pose, from 0.
         direction: (3,) of the blows, world.
-        level: N, height of the blows.
+        level: N, peak force of the blows.
         taken, temperature: when, and deg C; None where not known.
         residual: RMS, SI.
         signal: RMS of the measurement, SI; of position channels about their mean.

@@ -1,4 +1,4 @@
-"""Torque limits of a drive that stands still under blows, of a catalogue or estimated."""
+"""Torque limits of a drive at rest under blows, of a catalogue or estimated."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class TorqueLimit:
 
 @dataclass(frozen=True)
 class RatingCheck:
-    """Torques of a joint that stands still under blows, against its drive's limits.
+    """Torques of a joint at rest under blows, against its drive's limits.
 
     Attributes:
         limits: every limit that applies, the one that governs first.
@@ -94,7 +94,7 @@ class Ratings:
         return {name: torque[which] / limit for name, (which, limit) in self.limits.items()}
 
     def check_blows(self, peak_torque: float, holding_torque: float = 0.0) -> RatingCheck:
-        """Check a joint that stands still under blows.
+        """Check a joint at rest under blows.
 
         Args:
             peak_torque: N m, the largest magnitude of gravity's and the vibration's torque

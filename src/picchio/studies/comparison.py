@@ -424,7 +424,7 @@ def _shown(key: str, side: Mapping[str, Any], first: Any) -> str:
         ends = [_shown(key.replace(last, f"life.{end}"), side, None) for end in ("p10", "p90")]
         return " to ".join(ends)  # an estimate is no lone number
     if last in ("rivets_to_failure", "p10", "p50", "p90") and not isinstance(value, list):
-        # Null is a life without end, if there is a shaft at all.
+        # Null is an unlimited life, if there is a shaft at all.
         known = key in side and side.get(f"{before}.sn_curve", "?") != ""
         return spoken.count(math.inf if known and value is None else value or math.nan)
     if value in (None, ""):

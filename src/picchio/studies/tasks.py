@@ -259,7 +259,7 @@ def blows_of(
         robot: its example task fills in what is not given; without one, `ASSUMED_BLOWS`, with a
             warning.
         task: another task file to fill it in.
-        force: N, height of a blow.
+        force: N, peak force of one blow.
         period: s, from one blow to the next.
         width: s, of a blow.
 

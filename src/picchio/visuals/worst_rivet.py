@@ -28,7 +28,7 @@ class WorstRivet:
         joint: the one that governs the verdict.
         index: its row among the flexible joints.
         pose_number: counted from 1.
-        rest: response to the burst; None where its ring-down has no end.
+        rest: response to the burst; None where its ring-down goes on.
         steady: steady state; None where there is none.
     """
 
@@ -119,7 +119,7 @@ def worst_rivet(
         try:
             response = rivet.response_along(operation.excitation, hits, operation.direction)
             found.append(response if (rivet.modes.poles.real < 0.0).all() or not hits else None)
-        except InputError:  # no steady state, or no end: the assessment has told
+        except InputError:  # no steady state, or it rings on: the assessment has told
             found.append(None)
     return WorstRivet(
         rivet=rivet,

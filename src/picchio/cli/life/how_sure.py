@@ -59,16 +59,13 @@ def _show_measurements(found: UncertainLife) -> None:
     known = not math.isnan(best[0].interval_decades[0])
     rows = []
     for one in best:
-        left = f"{one.interval_decades[1]:.1f}" if known else f"{100 * one.kept:.0f}"
+        left = spoken.factor(one.interval_decades[1]) if known else f"{100 * one.kept:.0f}"
         rows.append([one.words, left])
-    if known:
-        title = (
-            "What to measure first: the life's interval is now "
-            f"{best[0].interval_decades[0]:.1f} powers of ten wide"
-        )
-    else:
-        title = "What to measure first: what is left of the interval of the utilisation"
-    heads = ["to know", ">powers of\nten left" if known else ">left,\n%"]
+    now = spoken.factor(best[0].interval_decades[0]) if known else "100 %"
+    title = f"What to measure first, and the range of the life that remains (now {now})"
+    if not known:
+        title = "What to measure first, and the range of the utilisation that remains"
+    heads = ["to know", ">range that\nremains" + ("" if known else ", %")]
     out.print(table(heads, rows, title=title))
     commands = dict.fromkeys(one.command for one in best if one.command is not None)
     for command in list(commands)[:_COMMANDS]:
@@ -120,7 +117,7 @@ def show_spread(found: UncertainLife) -> None:
     heads = [">alone,\n%", *([">with\nothers, %"] if robot.totals else [])]
     out.print(table(
         ["what varies", "by", *heads, "from"], inputs,
-        title="Where the doubt is from: shares of the variance",
+        title="Main sources of uncertainty: shares of the variance",
     ))  # fmt: skip
     if small:
         out.print(f"Below {100 * _SMALL:g} % each: {', '.join(small)}.\n", style="dim")

@@ -90,7 +90,7 @@ def objective(
 ) -> float:
     """See `picchio.fatigue.sn.likelihood`; the gradient (5,) is written in place.
 
-    `limited`: whether there is an endurance limit; else the line has no end.
+    `limited`: whether there is an endurance limit; else the line goes on.
     """
     t, k = math.exp(theta[3]), math.exp(theta[2])
     share = 1.0 / (1.0 + math.exp(-theta[4]))

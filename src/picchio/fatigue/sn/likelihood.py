@@ -47,7 +47,7 @@ class Likelihood:
         cycles: (n,) ln of the cycles at failure, or reached without.
         failed: (n,) whether it failed.
         z: standard normal quantile z_P of the survival that the first parameter is for.
-        limited: whether there is an endurance limit. Without one, the line has no end and
+        limited: whether there is an endurance limit. Without one, the line goes on and
             SD is the strength at ND, which is anyone's choice.
     """
 

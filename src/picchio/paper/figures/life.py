@@ -161,7 +161,7 @@ def corrections(steps: tuple[Step, ...]) -> PaperFigure:
                         alpha=0.35 if math.isinf(step.rivets) else 0.75)  # fmt: skip
             joint = f", joint {step.joint + 1}" if step.joint >= 0 else ""
             if math.isinf(step.rivets):
-                words, side, away = f"no end ({end:.2g} without the limit){joint}", "right", -8
+                words, side, away = f"unlimited ({end:.2g} without the limit){joint}", "right", -8
                 arrow = {"arrowstyle": "->", "color": colour, "lw": 1.4}
                 ax.annotate("", (end * 8, k), xytext=(end, k), arrowprops=arrow)
             else:

@@ -1,7 +1,7 @@
 """Reducers: their ratings, the torque limits that bind at standstill, and the catalogue files.
 
 A catalogue life is that of rolling contacts that turn: the wave generator's bearing of a
-strain-wave gear, the crank's roller bearings of a cycloidal one. A joint that stands still under
+strain-wave gear, the crank's roller bearings of a cycloidal one. A joint at rest under
 blows turns nothing: its contacts fret in one spot (false brinelling), which no catalogue covers. So
 for percussive work the check that decides is the peak torque, gravity and vibration together,
 against the limit for repeated peaks. A blow is part of the duty, not an accident: the limit for
@@ -120,7 +120,7 @@ class Reducer(ReducerEntry, Ratings):
 
     def _warnings(self, found: Iterable[TorqueLimit]) -> list[str]:
         return [
-            f"{self.name}: the catalogue life presumes turning; a joint that stands still under "
+            f"{self.name}: the catalogue life presumes turning; a joint at rest under "
             "blows risks false brinelling, which no catalogue covers",
             *(f"{self.name}: {text}" for text in super()._warnings(found)),
         ]

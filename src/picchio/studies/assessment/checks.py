@@ -120,7 +120,7 @@ def assumptions_of(
             "reducers: the peak torque of gravity and blows against the catalogue's limits for "
             "repeated and momentary peaks, what is held against that for the average torque where "
             "the catalogue has one (the rated torque is for the rated life at the rated speed, no "
-            "limit at standstill); a joint that stands still under blows risks false brinelling, "
+            "limit at standstill); a joint at rest under blows risks false brinelling, "
             "which no catalogue covers",
             "risk of false brinelling, a class and never a life: high where a joint stands in one "
             "place, low where it moves on by more than a contact's width after every pose (doi "

@@ -48,7 +48,7 @@ class OperationResult:
         natural_frequencies: (n_poses, n) Hz.
         peak_deflection: (n_poses, n) rad, of the method's own response.
         steady_peak_deflection: (n_poses, n) rad, exact steady state; NaN where there is none.
-        rest_peak_deflection: (n_poses, n) rad, a rivet from rest; NaN where it has no end.
+        rest_peak_deflection: (n_poses, n) rad, a rivet from rest; NaN where it goes on.
         peak_torque: (n_poses, n) N m (N for a prismatic joint), of the vibration, through the
             spring: what shaft and reducer carry.
         gravity_torque: (n_poses, n) N m, magnitude.
@@ -294,7 +294,7 @@ class Assessment(TableResult):
         sn_curve: names of the curves used.
         joints: one entry a flexible joint.
         operations: one entry an operation.
-        limiting_joint: shortest life, or largest utilisation where no life has an end; None
+        limiting_joint: shortest life, or largest utilisation where every life is unlimited; None
             where no joint has a shaft.
         rivets_to_failure: of the limiting joint; infinite where the life is unlimited.
         steady_state: what the steady state misjudges, one entry a joint.

@@ -64,7 +64,7 @@ class Verdict:
     """The result of an assessment in a few words.
 
     Attributes:
-        status: "safe" (no part of a flexible joint reaches its limit, and no life has an end),
+        status: "safe" (no part of a flexible joint reaches its limit, and every life is unlimited),
             "limited" (a finite life), "fails" (a limit is exceeded) or "cannot-be-told".
         governed_by: shaft (fatigue), reducer (a limit of its catalogue), yield (the shaft's static
             strength), resonance or input.

@@ -50,7 +50,7 @@ class Standing:
 
     @property
     def limiting_joint(self) -> str:
-        """Shortest life, or the largest utilisation where no life has an end."""
+        """Shortest life, or the largest utilisation where every life is unlimited."""
         return min(self.joints, key=lambda j: (j.rivets_to_failure, -j.utilisation)).name
 
     @property
@@ -87,7 +87,7 @@ class Gain:
     """What one standing of the work has over another.
 
     Attributes:
-        life: by how much longer the weakest joint lives; NaN where neither life has an end,
+        life: by how much longer the weakest joint lives; NaN where both lives are unlimited,
             infinite where only the second has none.
         utilisation: by how much less the most utilised joint is utilised.
     """
@@ -111,9 +111,9 @@ class Gain:
 
     @property
     def words(self) -> str:
-        """The life's part, or, where no life has an end, the utilisation's."""
+        """The life's part, or, where every life is unlimited, the utilisation's."""
         if math.isinf(self.life):
-            return "a life that has no end"
+            return "an unlimited life"
         if not math.isnan(self.life):
             return f"{self.life:.4g} times the life"
         if self.utilisation < 1.0:
@@ -187,7 +187,7 @@ class Placement(TableResult):
 
     @property
     def life_gain(self) -> float:
-        """By how much longer the weakest joint lives; NaN where neither life has an end."""
+        """By how much longer the weakest joint lives; NaN where both lives are unlimited."""
         return self.gain.life
 
     @property

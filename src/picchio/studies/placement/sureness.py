@@ -30,7 +30,7 @@ class Sureness:
         cases: how many were drawn.
         start: (P10, P50, P90) rivets to failure, of the work as it is now.
         best: likewise, at the best place.
-        life: of the ratio of the two; None where no life has an end.
+        life: of the ratio of the two; None where every life is unlimited.
         utilisation: of the start's highest utilisation over the best place's.
         better_share: of the cases, in which the best place is the better one.
     """

@@ -19,8 +19,6 @@ from picchio.studies.uncertainty.measurements import Measurement
 _TURN = 0.02
 # A life known to no better than so many powers of ten is said to be hardly known.
 _WIDE = 2.0
-# Estimates named in a sentence.
-_FEW = 3
 
 
 @dataclass(frozen=True)
@@ -111,18 +109,15 @@ class UncertainLife(TableResult):
     def doubt(self) -> str:
         """Why the life is an interval, in a sentence."""
         most = max(self.robot.shares, key=lambda name: self.robot.shares[name])
-        few = ", ".join(self.estimated[:_FEW])
-        more = len(self.estimated) - _FEW
-        guessed = few if more <= 0 else f"{few} and {more} more"
-        why = f" ({guessed}: estimated)" if guessed else ""
+        count = len(self.estimated)
+        who = f"{count} input{'s are estimates' if count > 1 else ' is an estimate'}"
         text = (
-            f"values are uncertain{why}: rivets to failure are an interval that holds 80 % of the "
-            f"cases; {most} matters most, {100 * self.robot.shares[most]:.0f} % of the variance of "
-            "the logarithm of the utilisation"
+            f"{who if count else 'inputs have spreads'}, results are 80 % ranges; {most} matters "
+            f"most ({100 * self.robot.shares[most]:.0f} % of the variance)"
         )
-        wide = f"is {self.decades:.2g} powers of ten wide"
+        wide = "" if math.isnan(self.decades) else f"is {spoken.factor(self.decades)} wide"
         if math.isinf(self.robot.p90) and math.isfinite(self.robot.p10):
-            wide = "has no upper end"
+            wide = "is open upwards"
         elif not self.decades > _WIDE:
             return text
         return (

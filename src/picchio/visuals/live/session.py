@@ -283,4 +283,4 @@ class Session:
 
 def _count(value: float) -> float | str:
     """A number of rivets; one without end as the word, which JSON has no number for."""
-    return "no end" if math.isinf(value) else float(f"{value:.6g}")
+    return "unlimited" if math.isinf(value) else float(f"{value:.6g}")

@@ -84,7 +84,7 @@ def _figures(
                 f"Life of the robot against a factor on {name}: it falls and rises again",
                 f"A larger {name} does not always make the life longer, nor shorter: the blows "
                 "excite a mode. Everything else is as stated; where the line breaks, the life has "
-                "no end.",
+                "unlimited.",
                 main=True)  # fmt: skip
     if worst.rest is not None:
         peak = worst.rest.peaks(operation.direction)[worst.index].value

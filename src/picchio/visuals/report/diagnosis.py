@@ -421,7 +421,7 @@ def _life_cell(key: str, value: Any, given: bool = True) -> str:
     if not given:
         return _DASH
     if value is None:
-        return "no end" if "rivets" in key else _DASH
+        return "unlimited" if "rivets" in key else _DASH
     if isinstance(value, (list, tuple)):
         return " to ".join(_life_cell(key, part) for part in value)
     if isinstance(value, bool) or not isinstance(value, (int, float)):
@@ -447,7 +447,7 @@ _AGREEMENT = {
     "both": "both kinds of records agree",
     "percussion": "percussion records show it; the motion records cannot see it",
     "motion": "motion records show it; the percussion records cannot see it",
-    "drive": "motion records show it, or more of it: in the drive, which stands still under blows",
+    "drive": "motion records show it, or more: in the drive (motors assumed locked under blows)",
     "contradiction": "the two kinds of records contradict each other",
 }
 

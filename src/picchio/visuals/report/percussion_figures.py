@@ -387,7 +387,7 @@ class PercussionResidualFigures(_Percussion):
         found: dict[str, list[object]] = {
             "pose": [f"{p.pose + 1}" for p in rows],
             "direction of the blows": [direction_label(p.direction) for p in rows],
-            "height of the blows [N]": [p.level for p in rows],
+            "peak force of the blows [N]": [p.level for p in rows],
         }
         if len(set(found["direction of the blows"])) > 8:
             found["direction of the blows"] = [_octant(p.direction) for p in rows]

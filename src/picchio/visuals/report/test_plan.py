@@ -8,6 +8,7 @@ from itertools import groupby
 
 import numpy as np
 
+from picchio.core import spoken
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.planning.choose import Chosen
 from picchio.diagnosis.planning.kind import along, angles
@@ -66,7 +67,7 @@ def plan_page(
         joints=[
             [joint.name, number(joint.before, 3), number(joint.after, 3)] for joint in found.joints
         ],
-        decades=(number(now, 3), number(then, 3)),
+        factors=(spoken.factor(now), spoken.factor(then)),
         next_command=found.next_command("FOLDER"),
         command=command,
         warnings=warnings,

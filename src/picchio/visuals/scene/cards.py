@@ -40,9 +40,9 @@ def joint_card(
         rows.append(("stress then", f"{factor * envelope.peak_deflection[k] / 1e6:.3g} MPa", ""))
     if assessment is not None:
         life = assessment.joint(joint.name)
-        rows.append(("used on the task", f"{life.told_percent(life.governing_key)} %", ""))
-        rows.append(("life on the task", f"{life.told_life} rivets"
-                     if life.told_life not in ("-", "no end") else life.told_life, ""))  # fmt: skip
+        rows.append(("utilisation on the task", f"{life.told_percent(life.governing_key)} %", ""))
+        unit = "" if life.told_life in ("-", spoken.UNLIMITED) else " rivets"
+        rows.append(("life on the task", f"{life.told_life}{unit}", ""))
 
     def source(*keys: str) -> str:
         told = (robot.origins.get(f"{joint.name}.{key}", "") for key in keys)
@@ -94,7 +94,7 @@ def rivet_card(assessment: Assessment, operation: OperationResult, i: int) -> li
     use = np.fmax(operation.utilisation[i], operation.reducer_utilisation[i])
     if np.isfinite(use).any():
         j = int(np.nanargmax(use))
-        rows.append(("used", f"{100.0 * use[j]:.3g} % of {names[j]}", ""))
+        rows.append(("utilisation", f"{spoken.per_cent(use[j])} %, in {names[j]}", ""))
     j = int(np.argmax(operation.peak_deflection[i]))
     unit = assessment.joints[j].units.small
     peak = f"{1e3 * operation.peak_deflection[i, j]:.3g} {unit}, in {names[j]}"

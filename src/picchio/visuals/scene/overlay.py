@@ -71,7 +71,7 @@ def joint_values(
         np.isfinite(parts).any(axis=1), np.nan_to_num(parts).max(axis=1), np.nan
     )
     if np.isfinite(utilisation).any():
-        return utilisation, Scale("utilisation", "%", float(np.nanmax(utilisation)))
+        return utilisation, Scale("utilisation", "%", 100.0)
     torque = np.array([joint.peak_torque for joint in joints])
     return torque, Scale("peak torque in a rivet", "N m", _largest(torque, ~slides))
 
@@ -91,7 +91,7 @@ def rivet_values(assessment: Assessment) -> tuple[list[FloatArray], Scale]:
             scale = Scale("damage of a rivet, worst = 100", "%", 100.0)
             return [d / top * 100 for d in damage], scale
         use = [100 * np.nanmax(op.utilisation, axis=1) for op in operations]
-        return use, Scale("utilisation by a rivet", "%", max(float(u.max()) for u in use))
+        return use, Scale("utilisation by a rivet", "%", 100.0)
     turning = [joint.kind != "prismatic" for joint in assessment.joints]
     torque = [op.peak_torque[:, turning].max(axis=1, initial=0.0) for op in operations]
     top = max(float(t.max()) for t in torque)

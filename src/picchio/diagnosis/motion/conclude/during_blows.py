@@ -15,7 +15,7 @@ from picchio.model.motion import WINDUP
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.tasks import Task
 
-STANDS = "acts in the drive, which stands still while the tool hits"
+STANDS = "acts in the drive: motors assumed locked while the tool hits"
 CARRIES = "carries part of the weight, which a blow meets as a mean load alone: state a balancer"
 READS = "is in the readings, not in the robot"
 NO_CAUSE = "no cause is claimed: the life is what picchio assess says of the nominal robot"

@@ -2,7 +2,7 @@
 const BLOWS = { force: ["force of a blow", "N", 1], rate: ["blows a second", "1/s", 1],
   width: ["width of a blow", "ms", 1e3], preload: ["feed force", "N", 1], hits: ["blows a rivet", "", 1] };
 const HEADS = [["joint", ""], ["peak", "mrad"], ["worst", "mrad"], ["torque", "N m"], ["stress", "MPa"],
-  ["used", "%"], ["life, rivets", "P10 to P90"]];
+  ["utilisation", "%"], ["life, rivets", "P10 to P90"]];
 const rows = {}, sliders = [];
 
 function say(text, bad) {
@@ -12,7 +12,7 @@ function say(text, bad) {
 
 const number3 = (x) => (x === null ? "–" : Math.abs(x) >= 1e5 ? x.toExponential(1) : x !== 0 && Math.abs(x) < 1e-3 ? "≈ 0"
   : Number(x.toPrecision(3)).toString());
-const count = (x) => (x === "no end" ? x : x >= 1e5 ? x.toExponential(1) : String(Math.round(x)));
+const count = (x) => (x === "unlimited" ? x : x >= 1e5 ? x.toExponential(1) : String(Math.round(x)));
 function lifeText(joint) {
   if (joint.life_interval === null) return joint.life === null ? "–" : count(joint.life);
   const [low, high] = joint.life_interval.map(count);
@@ -133,10 +133,10 @@ function weakest(values) {
     const known = values.models[name].joints.filter((joint) => used(joint) !== null);
     if (!known.length) return "no shaft and no drive is known: no life";
     const end = (joint) => (joint.life_interval ? joint.life_interval[0] : joint.life);
-    const low = (joint) => { const life = end(joint); return life === "no end" || life === null ? Infinity : life; };
+    const low = (joint) => { const life = end(joint); return life === "unlimited" || life === null ? Infinity : life; };
     const worst = known.reduce((a, b) => (low(b) < low(a) || (low(b) === low(a) && used(b) > used(a)) ? b : a));
     const told = data.models.length > 1 ? `${name}: ` : "";
-    const lasts = lifeText(worst) === "no end" ? "a life without end" : `${lifeText(worst)} rivets`;
-    return `${told}${worst.name} decides: ${lasts}, ${number3(100 * used(worst))} % used`;
+    const lasts = lifeText(worst) === "unlimited" ? "an unlimited life" : `${lifeText(worst)} rivets`;
+    return `${told}${worst.name} decides: ${lasts}, ${number3(100 * used(worst))} % utilisation`;
   }).join("; ");
 }

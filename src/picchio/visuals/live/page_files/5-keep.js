@@ -9,7 +9,7 @@ function table() {
 }
 
 function csv() {
-  const cell = (x) => (x === null ? "" : typeof x === "string" && /[",\n]/.test(x) ? `"${x.replaceAll('"', '""')}"` : String(x === "no end" ? "inf" : x));
+  const cell = (x) => (x === null ? "" : typeof x === "string" && /[",\n]/.test(x) ? `"${x.replaceAll('"', '""')}"` : String(x === "unlimited" ? "inf" : x));
   return table().map((line) => line.map(cell).join(",")).join("\n") + "\n";
 }
 
