@@ -6,6 +6,7 @@ import functools
 import inspect
 import re
 import textwrap
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
@@ -20,13 +21,10 @@ from picchio.core.guard import guard
 ROBOT, BLOWS, OUTPUT = "The robot", "The blows", "What is written and printed"
 
 
-def examples(*commands: str) -> str:
-    """The end of a command's help.
-
-    Args:
-        *commands: what may be typed, without the program's name.
-    """
-    return "\n".join(f"picchio {command}" for command in commands)
+@functools.cache
+def _examples() -> dict[str, list[str]]:
+    """By command, what may be typed, without the program's name."""
+    return tomllib.loads((Path(__file__).parent / "examples.toml").read_text())
 
 
 class _Command(TyperCommand):
@@ -35,9 +33,14 @@ class _Command(TyperCommand):
     Its help tells the options that the examples use first, the others by what they are about.
     """
 
+    @property
+    def examples(self) -> list[str]:
+        """What may be typed, without the program's name."""
+        return _examples()[self.name or ""]
+
     def format_options(self, context: Any, formatter: Any) -> None:
         """Arguments, the options of the examples, then the others in groups."""
-        used = set(re.findall(r"(?<= )--?[a-z][a-z-]*", self.epilog or ""))
+        used = set(re.findall(r"(?<= )--?[a-z][a-z-]*", " ".join(self.examples)))
         titles = ("Arguments", "Options used most", BLOWS, ROBOT, OUTPUT, "More options")
         groups: dict[str, list[Any]] = {title: [] for title in titles}
         for param in self.get_params(context):
@@ -56,11 +59,9 @@ class _Command(TyperCommand):
     def format_epilog(self, context: Any, formatter: Any) -> None:
         """The examples, a line each."""
         with formatter.section("Examples"):
-            for line in (self.epilog or "").splitlines():
-                formatter.write(textwrap.fill(
-                    line, formatter.width, initial_indent="  ", subsequent_indent="      ",
-                    break_on_hyphens=False, break_long_words=False,
-                ) + "\n")  # fmt: skip
+            for line in self.examples:
+                told = textwrap.wrap(f"picchio {line}", formatter.width - 6, break_on_hyphens=False)
+                formatter.write("  " + "\n      ".join(told) + "\n")
 
     def make_context(self, *arguments: Any, **options: Any) -> Any:
         guard.begin()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -49,6 +50,8 @@ def _json(text: str) -> str:
     return text if text == "-" else str(to_write(text, "--json"))
 
 
+_robot = partial(typer.Option, rich_help_panel=ROBOT)
+_blows = partial(typer.Option, rich_help_panel=BLOWS)
 PAGES = (".html", ".htm")
 PICTURES = (".png", ".svg", ".pdf")
 
@@ -98,86 +101,73 @@ RobotArgument = Annotated[
 ]
 FlexOption = Annotated[
     Path | None,
-    typer.Option(
+    _robot(
         metavar="FILE",
         help="Sidecar (TOML) with stiffness, damping and shafts; the robot's own if not given.",
-        rich_help_panel=ROBOT,
     ),
 ]
 ToolOption = Annotated[
     str | None,
-    typer.Option(
+    _robot(
         metavar="FRAME",
         help="Frame of the URDF on which the tool's force acts; the sidecar's if not given.",
-        rich_help_panel=ROBOT,
     ),
 ]
 ReducersOption = Annotated[
     list[Path] | None,
-    typer.Option(
+    _robot(
         metavar="FILE",
         help="Catalogue of reducers (TOML, see `picchio formats reducers`), stronger than those "
         "shipped; may be repeated.",
-        rich_help_panel=ROBOT,
     ),
 ]
 TaskOption = Annotated[
     Path | None,
-    typer.Option(
+    _blows(
         metavar="FILE",
         help="What the robot does (TOML, see `picchio formats task`); its example task if not "
         "given, else one that is printed first.",
-        rich_help_panel=BLOWS,
     ),
 ]
 PayloadOption = Annotated[
     float | None,
-    typer.Option(metavar="KG", help="Rated payload; narrows the estimates.", rich_help_panel=ROBOT),
+    _robot(metavar="KG", help="Rated payload; narrows the estimates."),
 ]
 ReachOption = Annotated[
     float | None,
-    typer.Option(
-        metavar="M", help="Rated reach; what the URDF says if not given.", rich_help_panel=ROBOT
-    ),
+    _robot(metavar="M", help="Rated reach; what the URDF says if not given."),
 ]
 ClassOption = Annotated[
     str | None,
-    typer.Option(
+    _robot(
         "--class",
         metavar="CLASS",
         help="Of the drives: strain-wave, cycloidal, planetary, direct or ball-screw.",
-        rich_help_panel=ROBOT,
     ),
 ]
 SNCurveOption = Annotated[
     str | None,
-    typer.Option(
+    _robot(
         autocompletion=curve_names,
         metavar="NAME",
         help="S-N curve of all shafts: a name or a TOML file; each shaft's own if not given.",
-        rich_help_panel=ROBOT,
     ),
 ]
 ForceOption = Annotated[
     float | None,
-    typer.Option(
-        help="Peak force of one blow, N; the example task's if not given.", rich_help_panel=BLOWS
-    ),
+    _blows(help="Peak force of one blow, N; the example task's if not given."),
 ]
 PeriodOption = Annotated[
     float | None,
-    typer.Option(help="Time from one blow to the next, s; likewise.", rich_help_panel=BLOWS),
+    _blows(help="Time from one blow to the next, s; likewise."),
 ]
-WidthOption = Annotated[
-    float | None, typer.Option(help="Duration of a blow, s; likewise.", rich_help_panel=BLOWS)
-]
+WidthOption = Annotated[float | None, _blows(help="Duration of a blow, s; likewise.")]
 HitsOption = Annotated[
     int | None,
-    typer.Option(
+    _blows(
         metavar="N",
         min=1,
         help="Blows of a burst from rest, at most 10000; steady state if not given.",
-        rich_help_panel=BLOWS,
     ),
 ]
 DataOption = Annotated[
@@ -197,11 +187,10 @@ JsonOption = Annotated[
 ]
 GravityStiffnessOption = Annotated[
     bool | None,
-    typer.Option(
+    _robot(
         "--gravity-stiffness/--no-gravity-stiffness",
         help="Whether gravity's stiffness dg/dq is added to that of the springs; of a saved model "
         "what its fit assumed.",
-        rich_help_panel=ROBOT,
     ),
 ]
 

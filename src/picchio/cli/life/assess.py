@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from picchio.cli.app import app, examples
+from picchio.cli.app import app
 from picchio.cli.life.how_sure import parse_spreads, show_spread
 from picchio.cli.options import (
     ClassOption,
@@ -53,13 +53,7 @@ if TYPE_CHECKING:
     from picchio.studies.tasks import Task
 
 
-@app.command(
-    epilog=examples(
-        "assess fanuc_like_3dof",
-        "assess arm.urdf --flex arm.flex.toml --task task.toml --report life.html",
-        "assess ur10 --for-life 1e6 --survival 0.99",
-    )
-)
+@app.command()
 def assess(
     robot: RobotArgument,
     task: TaskOption = None,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from picchio.cli.app import app, examples
+from picchio.cli.app import app
 from picchio.cli.options import FlexOption, JsonOption, ReportOption, TaskOption, ToolOption
 from picchio.cli.output import (
     console,
@@ -25,13 +25,7 @@ if TYPE_CHECKING:
     from picchio.studies.comparison import Comparison, Difference
 
 
-@app.command(
-    epilog=examples(
-        "compare ur10 ur5",
-        "compare before.json after.json --report comparison.html",
-        "compare gun_a.toml gun_b.toml --robot ur10 --task task.toml",
-    )
-)
+@app.command()
 def compare(
     items: Annotated[
         list[str],

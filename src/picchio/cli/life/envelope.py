@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import typer
 
-from picchio.cli.app import app, examples
+from picchio.cli.app import app
 from picchio.cli.options import (
     POSE_HELP,
     FlexOption,
@@ -30,13 +30,7 @@ if TYPE_CHECKING:
     from picchio.studies.envelopes import DirectionEnvelope
 
 
-@app.command(
-    epilog=examples(
-        "envelope fanuc_like_3dof",
-        "envelope fanuc_like_3dof --pose=0.3,1.1,-1.0 --hits 12",
-        "envelope ur10 --pose=home --force 500 --json envelope.json",
-    )
-)
+@app.command()
 def envelope(
     robot: RobotArgument,
     pose: Annotated[

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from picchio.cli.app import app, examples
+from picchio.cli.app import app
 from picchio.cli.ending import ending
 from picchio.cli.options import (
     FlexOption,
@@ -22,13 +22,7 @@ from picchio.cli.options import (
 from picchio.cli.output import deliver, telling
 
 
-@app.command(
-    epilog=examples(
-        "explore fanuc_like_3dof --open",
-        "explore ur10 --task task.toml --save kept.toml",
-        "explore ur10 --model extended.toml --open",
-    )
-)
+@app.command()
 def explore(
     robot: RobotArgument,
     task: TaskOption = None,

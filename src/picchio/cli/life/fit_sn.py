@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from picchio.cli.app import app, examples
+from picchio.cli.app import app
 from picchio.cli.options import PICTURES, JsonOption, output
 from picchio.cli.output import console, deliver, styled, table, telling
 
@@ -15,13 +15,7 @@ if TYPE_CHECKING:
     from picchio.fatigue.sn.fit import Estimate, SNFit
 
 
-@app.command(
-    epilog=examples(
-        "fit-sn tests.csv",
-        "fit-sn tests.csv --out my-steel.toml --plot fit.png",
-        "fit-sn tests.csv --survival 0.99 --out my-steel.toml",
-    )
-)
+@app.command()
 def fit_sn(
     tests: Annotated[
         Path,

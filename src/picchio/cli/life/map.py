@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from picchio.cli.app import app, examples
+from picchio.cli.app import app
 from picchio.cli.options import (
     PAGES,
     PICTURES,
@@ -43,14 +43,7 @@ if TYPE_CHECKING:
     from picchio.studies.maps.result import WorkspaceMap
 
 
-@app.command(
-    "map",
-    epilog=examples(
-        "map fanuc_like_3dof",
-        "map fanuc_like_3dof --plane xz --spacing 0.1 --out map.nc --plot map.png",
-        "map ur10 --box --spacing 0.2 --html map.html",
-    ),
-)
+@app.command("map")
 def map_(
     robot: RobotArgument,
     out: Annotated[

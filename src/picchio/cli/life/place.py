@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from picchio.cli.app import app, examples
+from picchio.cli.app import app
 from picchio.cli.options import (
     FlexOption,
     JsonOption,
@@ -35,13 +35,7 @@ if TYPE_CHECKING:
     from picchio.studies.placement.result import Placement
 
 
-@app.command(
-    epilog=examples(
-        "place fanuc_like_3dof",
-        "place ur10 --task task.toml --out moved.toml",
-        "place fanuc_like_3dof --move 0.3,0.3,0.3,30 --period-range 0.03,0.06",
-    )
-)
+@app.command()
 def place(
     robot: RobotArgument,
     task: TaskOption = None,

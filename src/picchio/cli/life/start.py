@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from picchio.cli.app import app, examples
+from picchio.cli.app import app
 from picchio.cli.options import ClassOption, JsonOption, PayloadOption, ReachOption, ToolOption
 from picchio.cli.output import console, count_of, deliver, styled, table, to_write
 from picchio.core.errors import InputError
@@ -19,13 +19,7 @@ if TYPE_CHECKING:
 _NAMED = 6  # rigid joints of one reason
 
 
-@app.command(
-    epilog=examples(
-        "start arm.urdf",
-        "start ur10 --payload 10 --class strain-wave",
-        "start arm.urdf --reducer joint_1=RV-80E-121 --out cell",
-    )
-)
+@app.command()
 def start(
     robot: Annotated[
         str, typer.Argument(metavar="ROBOT", help="A URDF, or a name from `picchio robots`.")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from picchio.cli.app import app, examples
+from picchio.cli.app import app
 from picchio.cli.ending import ending
 from picchio.cli.options import (
     PAGES,
@@ -34,13 +34,7 @@ if TYPE_CHECKING:
     from picchio.visuals.scene.scene import Scene
 
 
-@app.command(
-    epilog=examples(
-        "view fanuc_like_3dof",
-        "view ur10 --task task.toml --out scene.html",
-        "view ur10 --pose=0,-1,1,0,0,0 --joint elbow_joint",
-    )
-)
+@app.command()
 def view(
     robot: RobotArgument,
     out: Annotated[

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import typer
 
-from picchio.cli.app import app, examples
+from picchio.cli.app import app
 from picchio.cli.options import (
     FlexOption,
     GravityStiffnessOption,
@@ -39,13 +39,7 @@ if TYPE_CHECKING:
 _STYLES = {"error": "bold red", "warning": "yellow", "note": "dim"}
 
 
-@app.command(
-    epilog=examples(
-        "check measurements/",
-        "check measurements/ --robot ur10 --report check.html",
-        "check measurements/ --keep-going --json check.json",
-    )
-)
+@app.command()
 def check(
     campaign: Annotated[
         Path, typer.Argument(metavar="CAMPAIGN", help="Folder with a campaign.toml.")

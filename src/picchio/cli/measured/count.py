@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import typer
 
-from picchio.cli.app import app, examples
+from picchio.cli.app import app
 from picchio.cli.options import (
     FlexOption,
     JsonOption,
@@ -46,13 +46,7 @@ if TYPE_CHECKING:
     from picchio.studies.tasks import Task
 
 
-@app.command(
-    epilog=examples(
-        "count fanuc_like_3dof --log logs --ledger cell4.ledger",
-        "count ur10 --log logs --ledger cell4.ledger --task task.toml --report life.html",
-        "count ur10 --log logs --ledger cell4.ledger --watch --hours-per-day 16",
-    )
-)
+@app.command()
 def count(
     robot: RobotArgument,
     ledger: Annotated[

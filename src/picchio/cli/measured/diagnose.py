@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from picchio.cli.app import app, examples
+from picchio.cli.app import app
 from picchio.cli.options import (
     DataOption,
     FlexOption,
@@ -39,13 +39,7 @@ if TYPE_CHECKING:
     from picchio.diagnosis.result import Diagnosis
 
 
-@app.command(
-    epilog=examples(
-        "diagnose fanuc_like_3dof --data measurements/",
-        "diagnose ur10 --data measurements/ --report why.html --model extended.toml",
-        "diagnose ur10 --data measurements/ --task task.toml --plan next.toml",
-    )
-)
+@app.command()
 def diagnose(
     robot: RobotArgument,
     data: DataOption,

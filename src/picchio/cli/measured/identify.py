@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from picchio.cli.app import app, examples
+from picchio.cli.app import app
 from picchio.cli.options import (
     DataOption,
     FlexOption,
@@ -31,13 +31,7 @@ if TYPE_CHECKING:
     from picchio.diagnosis.identified import Identification
 
 
-@app.command(
-    epilog=examples(
-        "identify kuka_kr300_r2500 --data motions/ --out identified.toml",
-        "identify ur10 --data loads/ --out ur10.flex.toml --report stiffness.html",
-        "assess kuka_kr300_r2500 --flex identified.toml",
-    )
-)
+@app.command()
 def identify(
     robot: RobotArgument,
     data: DataOption,

@@ -7,20 +7,13 @@ from typing import Annotated
 
 import typer
 
-from picchio.cli.app import app, examples
+from picchio.cli.app import app
 from picchio.cli.options import JsonOption, folder, output
 from picchio.cli.output import console, deliver
 from picchio.core.errors import InputError
 
 
-@app.command(
-    "import",
-    epilog=examples(
-        "import run.mcap",
-        "import run.mcap --write-mapping mapping.toml --robot ur10",
-        "import run.mcap --mapping mapping.toml --to campaign",
-    ),
-)
+@app.command("import")
 def import_(
     file: Annotated[
         Path,

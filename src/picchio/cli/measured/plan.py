@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from picchio.cli.app import app, examples
+from picchio.cli.app import app
 from picchio.cli.options import (
     FlexOption,
     JsonOption,
@@ -33,13 +33,7 @@ if TYPE_CHECKING:
     from picchio.diagnosis.planning.plan import PlannedTests
 
 
-@app.command(
-    epilog=examples(
-        "plan fanuc_r2000ic --budget 20min --with dial,scale",
-        "plan fanuc_r2000ic --budget 1h --with hammer,accelerometer --to taps",
-        "plan ur10 --task task.toml --flex known.toml --to loads",
-    )
-)
+@app.command()
 def plan(
     robot: RobotArgument,
     task: TaskOption = None,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from picchio.cli.app import app, examples
+from picchio.cli.app import app
 from picchio.cli.options import (
     FlexOption,
     GravityStiffnessOption,
@@ -23,13 +23,7 @@ if TYPE_CHECKING:
     from picchio.prediction.simulation import Simulation
 
 
-@app.command(
-    epilog=examples(
-        "simulate fanuc_like_3dof --plan plan.toml --to campaign",
-        "simulate ur10 --plan plan.toml --to campaign --overwrite --seed 4",
-        "simulate extended.toml --plan plan.toml --to campaign --parquet",
-    )
-)
+@app.command()
 def simulate(
     robot: RobotArgument,
     plan: Annotated[Path, typer.Option(metavar="PLAN.toml", help="The test plan.")],

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from picchio.cli.app import app, examples
+from picchio.cli.app import app
 from picchio.cli.options import JsonOption
 from picchio.cli.output import console, definitions, deliver, styled
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from picchio.reference.formats import FileFormat, Key
 
 
-@app.command(epilog=examples("effects", "effects base_compliance", "effects --json effects.json"))
+@app.command()
 def effects(
     name: Annotated[
         str | None, typer.Argument(metavar="NAME", help="Show one effect in full.")
@@ -31,7 +31,7 @@ def effects(
     deliver(found.to_dict(), json, one if name else every)
 
 
-@app.command(epilog=examples("formats", "formats task", "formats sidecar"))
+@app.command()
 def formats(
     name: Annotated[
         str | None, typer.Argument(metavar="NAME", help="Show one format with all its keys.")

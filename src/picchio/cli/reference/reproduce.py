@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from picchio.cli.app import app, examples
+from picchio.cli.app import app
 from picchio.cli.options import JsonOption, ReportOption
 from picchio.cli.output import (
     console,
@@ -21,9 +21,7 @@ if TYPE_CHECKING:
     from picchio.paper.run import Reproduction
 
 
-@app.command(
-    epilog=examples("reproduce", "reproduce --report paper.html", "reproduce --worlds 50 -v")
-)
+@app.command()
 def reproduce(
     report: ReportOption = None,
     assume: Annotated[

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from picchio.cli.app import app, examples
+from picchio.cli.app import app
 from picchio.cli.options import FlexOption, JsonOption, RobotArgument, output
 from picchio.cli.output import console, deliver, show_all, table, whole
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from picchio.robot.loading.catalogue import RobotEntry, RobotList
 
 
-@app.command(epilog=examples("robots", "robots --all", "robots --json robots.json"))
+@app.command()
 def robots(
     every: Annotated[bool, typer.Option("--all", help="All of them, with their sources.")] = False,
     json: JsonOption = None,
@@ -29,13 +29,7 @@ def robots(
     deliver(found.to_dict(), json, lambda: _show(found))
 
 
-@app.command(
-    epilog=examples(
-        "annotate ur10 --out robot.urdf",
-        "annotate ur10 --flex my_ur10.toml --out robot.urdf",
-        "annotate arm.urdf --flex arm.flex.toml --out robot.urdf",
-    )
-)
+@app.command()
 def annotate(
     robot: RobotArgument,
     out: Annotated[Path, output("--out", "FILE", "Where the URDF goes.")],

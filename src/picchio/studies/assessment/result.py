@@ -114,7 +114,7 @@ class JointLife:
         damage_per_rivet: mean over the rivets of the task's mix.
         rivets_to_failure: all rivets of the mix; infinite where the life is unlimited.
         sn_curve: name of the shaft's or the drive's curve; empty without either.
-        estimated_drive: its torque limits are an estimate, since no reducer is named.
+        estimated_drive: its torque limits are an estimate, since none is given.
         worn: whose fatigue the life is: "shaft" or "drive"; empty without either.
         worst_operation: where the utilisation (or, without a shaft, the deflection) is largest.
         worst_pose: index of the pose there.

@@ -53,7 +53,7 @@ class Drawn(NamedTuple):
     def ends(self, columns: Sequence[int]) -> FloatArray:
         """(n,) the share of the worlds in which each flexible joint ends the robot's life.
 
-        The shortest life; where none has an end, the highest utilisation of its parts.
+        The shortest life; where all are unlimited, the highest utilisation of its parts.
 
         Args:
             columns: of the k joints among the n flexible ones.

@@ -61,7 +61,7 @@ def compare_scene(
         "samples": np.zeros((len(robot.flexible_joints), 3, count)),
         "factor": exaggeration(moved, scene.reach),
     }
-    for (name, values), colour in zip(both.items(), (VERMILION, BLUE), strict=True):
+    for (name, values), colour in zip(both.items(), (BLUE, VERMILION), strict=True):
         samples = np.array([np.interp(grid, moments, row) for row in values])
         scene.tracks.append({"layer": name, "text": name, "colour": colour, "samples": samples})
         scene.layers.append((name, f"{name}, as a ghost", True))

@@ -59,7 +59,7 @@ def verdict_of(
 
 
 def leaves_little(after: Evidence, left: BeforeAndAfter | None) -> bool:
-    """Whether what is left is noise, or no more than a remainder that is allowed.
+    """Whether what the causes leave is noise, or no more than a remainder that is allowed.
 
     Args:
         after: what is left with the causes.

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from picchio.core import spoken
 from picchio.diagnosis.result import VERDICTS, Cause, Diagnosis
 from picchio.model.expansion import BASE_AXES
 from picchio.visuals.plots.style import GREY, SKY, VERMILION
@@ -81,10 +82,6 @@ def cause_text(cause: Cause) -> str:
         return text
     unit = known[0][1].unit
     told = [(name, v) for name, v in known if v.unit == unit] if len(known) == 3 else known[:1]
-    numbers = ", ".join(f"{name.replace('_', ' ')} {_number(v.value)}" for name, v in told)
+    numbers = ", ".join(f"{name.replace('_', ' ')} {spoken.number(v.value)}" for name, v in told)
+    numbers = numbers.replace("-", "\N{MINUS SIGN}")
     return f"{text}: {numbers}" + ("" if unit == "1" else f" {unit.replace('*', ' ')}")
-
-
-def _number(value: float) -> str:
-    mantissa, e, power = f"{value:.3g}".partition("e")
-    return (mantissa + (f"e{int(power)}" if e else "")).replace("-", "\N{MINUS SIGN}")
