@@ -39,6 +39,8 @@ def test_shares_intervals_and_factors():
         "about 0", "8.68", "130", "-"]  # fmt: skip
     assert spoken.between((0.0912, 0.332), spoken.per_cent) == "9.12 to 33.2"
     assert spoken.between((7.91e-9, 3.95e-8), spoken.per_cent) == "about 0"
+    assert [spoken.allowed(e) for e in ((320.0, None), (None, None), (2.0, 2.0))] == [
+        "320 to unlimited", "unlimited", "2"]  # fmt: skip
     assert [spoken.factor(x) for x in (1.97, 1.34)] == ["a factor 93", "a factor 22"]
 
 

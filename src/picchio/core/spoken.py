@@ -77,3 +77,12 @@ def factor(decades: float) -> str:
         such as "a factor 22".
     """
     return f"a factor {number(10.0**decades, 2)}"
+
+
+def allowed(ends: Sequence[float | None]) -> str:
+    """An interval of what is allowed; None, as in JSON, is unlimited.
+
+    Args:
+        ends: low and high.
+    """
+    return between([math.inf if end is None else end for end in ends])

@@ -469,7 +469,7 @@ def _show_allowable(found: AllowableLoads, task: Task, life: Assessment) -> None
     ))  # fmt: skip
     for key, ends in found.intervals.items():
         if not isinstance(ends, dict):
-            out.print(f"In 80 % of the drawn cases the most {_MOST[key]}: {spoken.between(ends)}.")
+            out.print(f"In 80 % of the drawn cases the most {_MOST[key]}: {spoken.allowed(ends)}.")
     if found.held is None and math.isfinite(found.force_factor):
         forces = ", ".join(
             f"{op.name} {found.force_factor * op.excitation.peak_force:.4g} N"

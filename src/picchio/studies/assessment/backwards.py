@@ -215,7 +215,7 @@ class AllowableLoads(TableResult):
         if math.isinf(self.force_factor):
             return "any"
         if (ends := self.intervals.get("force")) is not None:
-            return f"{spoken.between(ends)} N in 80 % of the cases"
+            return f"{spoken.allowed(ends)} N in 80 % of the cases"
         return f"{spoken.number(self.force)} N"
 
     def _force(self) -> str:
@@ -228,7 +228,7 @@ class AllowableLoads(TableResult):
         least = min(self.joints, key=lambda joint: joint.force_factor)
         part = "drive" if least.governed_by == "reducer" else "shaft"
         if (ends := self.intervals.get("force")) is not None:
-            return f"The force may be {spoken.between(ends)} N in 80 % of the drawn cases."
+            return f"The force may be {spoken.allowed(ends)} N in 80 % of the drawn cases."
         start = "The" if self.held is None else "At the stated values, which are uncertain, the"
         return (
             f"{start} force may be {self.force_factor:.4g} times as large, {self.force:.4g} N, by "
