@@ -217,7 +217,7 @@ def commands_page() -> str:
             "```sh",
             context.command_path + " " + " ".join(command.collect_usage_pieces(context)),
         ]
-        lines += [command.epilog.removeprefix("Example: ")] if command.epilog else []
+        lines += [f"picchio {line}" for line in command.examples]
         lines += ["```", ""]
         rows = []
         for option in command.params:

@@ -136,4 +136,4 @@ def test_bad_input_leaves_nothing(folder):
 
 
 def test_help_shows_an_example(folder):
-    assert "Example:" in picchio("import", "--help", cwd=folder).stdout
+    assert "Examples:" in picchio("import", "--help", cwd=folder).stdout

@@ -71,12 +71,12 @@ def test_json_to_a_file_and_the_table_to_stdout(picchio, tmp_path):
     found = json.loads(target.read_text())
     assert found["method"] == "paper"
     assert found["rivets_to_failure"] == min(j["rivets_to_failure"] for j in found["joints"])
-    rounded = float(f"{found['rivets_to_failure']:.4g}")
+    rounded = float(f"{found['rivets_to_failure']:.3g}")
     assert f"The robot survives {rounded:,.0f} rivets; joint_2 fails first" in done.stdout
 
 
 def test_help_shows_an_example_and_version_a_version(picchio):
-    assert "Example:" in picchio("assess", "--help").stdout
+    assert "Examples:" in picchio("assess", "--help").stdout
     assert picchio("--version").stdout.startswith("picchio 0.")
     listed = picchio("robots")
     assert "fanuc_like_3dof" in listed.stdout

@@ -20,7 +20,12 @@ def _narrow(monkeypatch):
 def test_every_option_is_told_whole_and_nothing_is_cut(picchio, name):
     text = picchio(name, "--help").stdout
     assert max(map(len, text.splitlines())) <= 80
-    assert "Example: picchio" in text and "…" not in text
+    head, examples = text.split("Examples:\n")
+    assert examples.count("  picchio ") == 3 and "…" not in text
+    used = set(re.findall(r"(?<= )--[a-z-]+", examples.replace("\n", " ")))
+    assert used <= set(re.findall(r"--[a-z-]+", head)) | {"--flex"}  # what is typed is there
+    first = head.partition("Options used most:")[2].split("\n\n")[0]
+    assert all(word in first for word in used - {"--flex"}), first
     for parameter in GROUP.commands[name].params:
         for word in (*parameter.opts, *parameter.secondary_opts):
             if word.startswith("--"):

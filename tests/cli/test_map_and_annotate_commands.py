@@ -60,7 +60,7 @@ def test_annotate_does_not_overwrite_what_it_reads(picchio, tmp_path, repository
 @pytest.mark.parametrize("command", ["assess", "map", "robots", "annotate", "fit-sn"])
 def test_every_command_tells_version_and_shows_an_example(picchio, command):
     assert picchio(command, "--version").stdout.startswith("picchio 0.")
-    assert "Example: picchio" in picchio(command, "--help").stdout
+    assert "Examples:\n  picchio" in picchio(command, "--help").stdout
 
 
 def test_damage_on_a_mesh(picchio, tmp_path):

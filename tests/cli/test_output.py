@@ -7,6 +7,8 @@ import sys
 import time
 from pathlib import Path
 
+import pytest
+
 import picchio as library
 from picchio.cli import waiting as waiting_module
 from picchio.cli.output import begin, console, folder_to_write, say_written, table, to_write
@@ -27,7 +29,7 @@ def test_an_assessment_is_whole_at_every_width(picchio, tables, tmp_path, monkey
     task.write_text(ONE_POSE)
     monkeypatch.setenv("COLUMNS", "60")
     done = picchio("assess", tmp_path / "arm.urdf", "--task", task, "--for-life", "1e6",
-                   "--compare-methods")  # fmt: skip
+                   "--compare-methods", "-v")  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert len(tables) >= 4 and done.stdout.count(LONG) > 4
     assert max(map(len, done.stdout.splitlines())) <= 60
@@ -36,7 +38,7 @@ def test_an_assessment_is_whole_at_every_width(picchio, tables, tmp_path, monkey
 
 def test_a_pipe_gets_full_lines(picchio, monkeypatch):
     monkeypatch.delenv("COLUMNS", raising=False)
-    lines = picchio("assess", "fanuc_like_3dof").stdout.splitlines()
+    lines = picchio("assess", "fanuc_like_3dof", "-v").stdout.splitlines()
     assert max(map(len, lines)) > 200
     assert sum(line.startswith("joint_2") for line in lines) == 2  # one a table
 
@@ -118,3 +120,60 @@ def test_long_work_shows_a_bar_and_short_work_none(monkeypatch):
     with bar.watched():
         time.sleep(0.2)
     assert sys.stderr.getvalue() == ""
+
+
+ANSWERS = (
+    ("assess", "fanuc_like_3dof"), ("assess", "ur10"), ("assess", "ur10", "--for-life", "1e6"),
+    ("compare", "ur10", "ur5"), ("robots",), ("envelope", "fanuc_like_3dof"), ("effects",),
+    ("formats", "task"),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("typed", ANSWERS, ids=" ".join)
+def test_an_answer_fits_25_lines_and_all_of_it_stands_in_v(picchio, typed, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    short, whole = (picchio(*typed, *more).stdout.splitlines() for more in ((), ("-v",)))
+    assert len(short) <= 25 and max(map(len, short)) <= 80
+    told = short[-1] == "To know more: -v"
+    assert told == (len(whole) > len(short))
+    # What is printed first is the same, so the verdict stands at the top of both.
+    assert short[0] == whole[0] or typed == ("robots",)
+
+
+def test_the_verdict_comes_before_the_table(picchio):
+    lines = picchio("assess", "fanuc_like_3dof").stdout.splitlines()
+    assert lines[0].startswith("fanuc_like_3dof on task.toml: Safe.")
+    table = next(k for k, line in enumerate(lines) if line.startswith("Life of the joints"))
+    assert 0 < table < 8
+
+
+def test_names_are_chosen_and_told(picchio, tmp_path):
+    done = picchio("map", "fanuc_like_3dof", "--spacing", "1.0", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "fanuc_like_3dof-map.nc").exists()
+    assert "wrote fanuc_like_3dof-map.nc" in done.stderr
+
+
+def test_the_task_gives_the_pose_of_an_envelope(picchio):
+    import json
+
+    found = json.loads(picchio("envelope", "fanuc_like_3dof", "--json", "-").stdout)
+    robot = library.load_robot("fanuc_like_3dof")
+    from picchio.studies.default_task import task_of
+
+    assert found["pose"] == task_of(robot).operations[0].poses[0].tolist()
+
+
+@pytest.mark.parametrize(
+    ("typed", "word", "names"),
+    [
+        (["assess"], "fanuc_l", {"fanuc_like_3dof"}),
+        (["assess", "ur10", "--sn-curve"], "C45", {"C45-QT-shaft"}),
+        (["view", "ur10", "--joint"], "wrist", {"wrist_1_joint", "wrist_2_joint", "wrist_3_joint"}),
+    ],
+)  # fmt: skip
+def test_the_shell_completes_names(picchio, monkeypatch, typed, word, names):
+    monkeypatch.setenv("_PICCHIO_COMPLETE", "complete_zsh")
+    monkeypatch.setenv("_TYPER_COMPLETE_ARGS", " ".join(["picchio", *typed, word]))
+    told = picchio().stdout
+    assert all(name in told for name in names), told

@@ -29,7 +29,7 @@ def test_bad_input_is_one_line_and_exit_2(picchio, arguments, part):
 def test_help_has_an_example(picchio):
     done = picchio("reproduce", "--help")
     assert done.returncode == 0
-    assert "Example: picchio reproduce" in done.stdout
+    assert "Examples:\n  picchio reproduce\n" in done.stdout
 
 
 @pytest.fixture(scope="module")

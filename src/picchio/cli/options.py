@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+import shlex
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -80,15 +82,17 @@ def curve_names() -> list[str]:
     return list(sn_curve_names())
 
 
-def joint_names(ctx: typer.Context) -> list[str]:
-    """For the shell: flexible joints of the robot that was typed before.
-
-    Args:
-        ctx: what was typed.
-    """
+def joint_names() -> list[str]:
+    """For the shell: flexible joints of the robot that was typed after the command."""
     from picchio.robot.loading.load import load_robot
 
-    return list(load_robot(ctx.params["robot"]).flexible_names) if ctx.params.get("robot") else []
+    # An option without its value yet is no whole line, so that nothing of it is parsed.
+    typed = os.environ.get("COMP_WORDS") or os.environ.get("_TYPER_COMPLETE_ARGS", "")
+    _, _, robot, *_ = [*shlex.split(typed), "", "", ""]
+    try:
+        return list(load_robot(robot).flexible_names)
+    except InputError:  # no robot yet
+        return []
 
 
 RobotArgument = Annotated[

@@ -21,7 +21,7 @@ def robots(
     every: Annotated[bool, typer.Option("--all", help="All of them, with their sources.")] = False,
     json: JsonOption = None,
 ) -> None:
-    """List the robots that can be named, arms with stiffness data first."""
+    """List the robots that can be named, arms with data first."""
     import picchio
 
     found = picchio.robots()
