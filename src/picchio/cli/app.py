@@ -99,10 +99,9 @@ class _App(typer.Typer):
             own = inspect.signature(function, eval_str=True)
             more = inspect.Parameter("verbose", inspect.Parameter.KEYWORD_ONLY, default=False,
                                      annotation=_VERBOSE)  # fmt: skip
-            told.__signature__ = own.replace(parameters=[*own.parameters.values(), more])  # type: ignore[attr-defined]
-            told.__annotations__ = {
-                p.name: p.annotation for p in told.__signature__.parameters.values()
-            }  # type: ignore[attr-defined]
+            every = {**own.parameters, "verbose": more}
+            told.__annotations__ = {name: p.annotation for name, p in every.items()}
+            vars(told)["__signature__"] = own.replace(parameters=list(every.values()))
             register(told)
             return function
 

@@ -299,7 +299,8 @@ def _answer(show: Callable[[], object]) -> None:
         show()
     finally:
         _held = None
-    screen, lines, cut = console(), [], False
+    screen, cut = console(), False
+    lines: list[str] = []
     for entry in held:
         room = _LINES - 1 - len(lines)
         if entry is None or room < 1:

@@ -167,8 +167,9 @@ class Comparison(Result):
         if len(judged) < 2:
             return ""
         told = ", ".join(f"{i.name}: {_word(i.verdict)}" for i in judged)
-        margins = {i.name: i.verdict.get("margin") for i in judged}
-        known = {name: margin for name, margin in margins.items() if _number(margin)}
+        known: dict[str, float] = {
+            i.name: i.verdict["margin"] for i in judged if _number(i.verdict.get("margin"))
+        }
         if len(known) < len(judged) or len(set(known.values())) == 1:
             return told
         best = max(known, key=lambda name: known[name])

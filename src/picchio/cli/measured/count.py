@@ -235,9 +235,9 @@ def _show(found: Count, task: Task) -> None:
         out.print("Every life is unlimited: no blow damages a shaft or a drive.")
     if blow := found.counted.usual_blow:
         rate = "" if blow["rate"] is None else f", {blow['rate']:.3g} a second"
-        force, width, samples = (blow[key] or 0.0 for key in ("force", "width", "samples"))
+        peak, width, samples = (blow[key] or 0.0 for key in ("force", "width", "samples"))
         wide = f"{1e3 * width:.3g} ms wide ({samples:.3g} samples)"
-        out.print(f"Blows as seen: {force:.4g} N, {wide}{rate}, in the mean.")
+        out.print(f"Blows as seen: {spoken.number(peak)} N, {wide}{rate}, in the mean.")
     for change in found.changes:
         out.print(styled("changed: ", change["words"], style="bold yellow"))
     if found.exchange is not None:
