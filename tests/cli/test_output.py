@@ -124,8 +124,7 @@ def test_long_work_shows_a_bar_and_short_work_none(monkeypatch):
 
 ANSWERS = (
     ("assess", "fanuc_like_3dof"), ("assess", "ur10"), ("assess", "ur10", "--for-life", "1e6"),
-    ("compare", "ur10", "ur5"), ("robots",), ("envelope", "fanuc_like_3dof"), ("effects",),
-    ("formats", "task"),
+    ("compare", "ur10", "ur5"), ("robots",), ("envelope", "fanuc_like_3dof"),
 )  # fmt: skip
 
 
@@ -138,6 +137,12 @@ def test_an_answer_fits_25_lines_and_all_of_it_stands_in_v(picchio, typed, monke
     assert told == (len(whole) > len(short))
     # What is printed first is the same, so the verdict stands at the top of both.
     assert short[0] == whole[0] or typed == ("robots",)
+
+
+@pytest.mark.parametrize("typed", [("effects",), ("formats", "task"), ("effects", "payload")])
+def test_a_reference_is_printed_whole(picchio, typed):
+    assert picchio(*typed).stdout == picchio(*typed, "-v").stdout
+    assert len(picchio(*typed).stdout.splitlines()) > 10
 
 
 def test_the_verdict_comes_before_the_table(picchio):

@@ -9,7 +9,7 @@ import typer
 
 from picchio.cli.app import app
 from picchio.cli.options import JsonOption
-from picchio.cli.output import console, definitions, deliver, styled
+from picchio.cli.output import console, definitions, deliver, show_all, styled
 
 if TYPE_CHECKING:
     from picchio.reference.effects import EffectDescription
@@ -26,6 +26,7 @@ def effects(
     """List the effects that a model may have, or show one in full."""
     import picchio
 
+    show_all(True)  # a reference is read whole
     found = picchio.effects(name)
     one, every = partial(_show_effect, found.effects[0]), partial(_list_effects, found.effects)
     deliver(found.to_dict(), json, one if name else every)
@@ -41,6 +42,7 @@ def formats(
     """List the files that picchio reads and writes, or one's keys."""
     import picchio
 
+    show_all(True)
     found = picchio.formats(name)
     one, every = partial(_show_format, found.formats[0]), partial(_list_formats, found.formats)
     deliver(found.to_dict(), json, one if name else every)
