@@ -70,7 +70,7 @@ def test_every_output_of_every_command_is_awaited():
 
     from picchio.cli.main import app
 
-    outputs = {"json", "report", "out", "plot", "model", "to", "html", "save", "mcap"}
+    outputs = {"json", "report", "out", "plot", "model", "to", "html", "save"}
     for name, command in typer.main.get_command(app).commands.items():
         for param in command.params:
             if param.name in outputs and (name, param.name) not in NO_OUTPUTS:

@@ -1,8 +1,10 @@
 """`picchio count` on shifts whose damage is known, however their logs are cut, mixed and broken."""
 
 import json
+import re
 import sqlite3
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -536,35 +538,31 @@ def test_a_fleet_has_a_row_a_robot(tmp_path, robot, in_process):
     assert "south" in (tmp_path / "f.html").read_text()
 
 
-def test_what_other_programs_read(tmp_path, robot, stretch):
-    """Prometheus' text by its grammar, the MCAP by mcap's own reader."""
-    import re
-
-    from mcap.reader import make_reader
-    from mcap_ros2.decoder import DecoderFactory
-
-    from picchio.ledger.out import opc_ua, prometheus, write_diagnostics
-
+def test_what_other_programs_read(tmp_path, robot, stretch, monkeypatch):
+    """The examples of the page on counting, by the grammar of Prometheus and the constants of ROS."""
     found = count(robot, stretch[2].parent / "logs", tmp_path / "l", sn_curve=str(stretch[2]))
-    lines = prometheus(found).splitlines()
+    (tmp_path / "life.json").write_text(json.dumps(found.to_dict()))
+    monkeypatch.chdir(tmp_path)
+    text = (Path(__file__).parents[2] / "docs" / "how_to" / "count.md").read_text()
+    codes = [part.partition("```")[0] for part in text.split("```python\n")[1:]]
+    made = {code.split()[1]: code for code in codes if "make_log" not in code}
+    names: dict[str, dict] = {name: {} for name in made}
+    for name in ("prometheus.py", "ros_status.py"):
+        exec(made[name], names[name])
+    lines = (tmp_path / "life.prom").read_text().splitlines()
     sample = re.compile(r'[a-z_]+\{[a-z_]+="[^"]*"(,[a-z_]+="[^"]*")*\} (\+Inf|[-+0-9.e]+)')
     told = dict(line.rsplit(" ", 1) for line in lines if not line.startswith("#"))
     assert all(sample.fullmatch(line) for line in lines if not line.startswith("#"))
     assert float(told['picchio_blows_total{robot="fanuc_like_3dof"}']) == 36.0
+    damage = found.counted.totals.damage
     own = 'picchio_damage_ratio{robot="fanuc_like_3dof",joint="joint_2"}'
-    assert float(told[own]) == found.counted.totals.damage[1]
-    names = {line.partition("{")[0] for line in told}
-    assert {line.split()[2] for line in lines if line.startswith("# TYPE")} == names
-    write_diagnostics(found, tmp_path / "d.mcap")
-    with open(tmp_path / "d.mcap", "rb") as stream:
-        reader = make_reader(stream, decoder_factories=[DecoderFactory()])
-        ((schema, channel, _, message),) = reader.iter_decoded_messages()
-    assert (schema.name, channel.topic) == ("diagnostic_msgs/msg/DiagnosticArray", "/diagnostics")
-    assert [s.name for s in message.status] == [f"picchio: joint_{k}" for k in (1, 2, 3)]
-    values = {v.key: float(v.value) for v in message.status[1].values}
-    assert values["damage"] == found.counted.totals.damage[1]
-    node = "MotionDeviceSystem/MotionDevices/fanuc_like_3dof/Axes/joint_2/ParameterSet/LifeUsed"
-    assert opc_ua(found)[node] == found.counted.totals.damage[1]
+    assert float(told[own]) == damage[1]
+    status = names["ros_status.py"]["status"]
+    assert [one["name"] for one in status] == [f"picchio: joint_{k}" for k in (1, 2, 3)]
+    assert {one["level"] for one in status} <= {b"\x00", b"\x01", b"\x02"}
+    assert float(status[1]["values"][0]["value"]) == damage[1]
+    assert all(len(code.splitlines()) <= 30 for code in made.values())
+    compile(made["opc_ua.py"], "opc_ua.py", "exec")
 
 
 def test_the_command_counts_and_its_page_shows_it(tmp_path, stretch, in_process, monkeypatch):

@@ -17,7 +17,6 @@ from picchio.core.results import TableResult
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.ledger.counted import HOUR, Counted
 from picchio.ledger.forecast import Worlds, quantiles
-from picchio.ledger.out import opc_ua
 from picchio.ledger.watch.exchange import Exchange
 from picchio.model.model import Model
 
@@ -282,7 +281,6 @@ class Count(TableResult):
             "known": list(self.known),
             "refused": [{"log": name, "why": why} for name, why in self.refused],
             "detected": {name: list(lines) for name, lines in self.detected.items()},
-            "opc_ua": opc_ua(self),
             "notes": list(self.notes),
             "provenance": self.origin,
         }

@@ -8,6 +8,7 @@ import re
 import typing
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Annotated, Any, Self, TypeVar
 
 import numpy as np
@@ -90,6 +91,7 @@ def _one_spread(record: T) -> T:
     return record
 
 
+@cache
 def numbers_of(table: type[StrictModel]) -> tuple[str, ...]:
     """The keys of a table that may have a spread.
 

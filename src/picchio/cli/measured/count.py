@@ -20,7 +20,6 @@ from picchio.cli.options import (
     SNCurveOption,
     TaskOption,
     ToolOption,
-    output,
 )
 from picchio.cli.output import (
     console,
@@ -96,14 +95,6 @@ def count(
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="A dask scheduler for a fleet.")
     ] = None,
-    prometheus: Annotated[
-        Path | None,
-        output("--prometheus", "FILE.prom", "Write the figures as Prometheus reads them."),
-    ] = None,
-    mcap: Annotated[
-        Path | None,
-        output("--mcap", "FILE.mcap", "Write diagnostic_msgs/DiagnosticArray (ROS 2).", ".mcap"),
-    ] = None,
     seed: Annotated[int, typer.Option(metavar="N", min=0, help="Random seed of the draws.")] = 0,
     report: ReportOption = None,
     json: JsonOption = None,
@@ -114,7 +105,6 @@ def count(
     shows blows they are those of the task, at the tool's trigger or the task's poses.
     """
     import picchio
-    from picchio.ledger.out import write_diagnostics, write_prometheus
     from picchio.studies.default_task import task_of
 
     if watch and not log:
@@ -122,7 +112,7 @@ def count(
     with notice_first(json):
         loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
     if fleet:
-        if not log or len(log) > 1 or watch or prometheus or mcap:
+        if not log or len(log) > 1 or watch:
             raise InputError("needs one --log, and is told as a table, --json or --report",
                              key="--fleet")  # fmt: skip
         from picchio.ledger.fleet import count_fleet
@@ -153,10 +143,6 @@ def count(
                     raise
                 say_warning(f"nothing is counted yet: {error}")  # it may be written just now
             else:
-                if prometheus is not None:
-                    write_prometheus(found, prometheus)
-                if mcap is not None:
-                    write_diagnostics(found, mcap)
                 write_report(found, report)
 
                 def show(found: Count = found) -> None:
