@@ -41,6 +41,28 @@ def test_the_header_wherever_it_stands(tmp_path, head):
         assert [c.unit for c in found.columns.values()] == ["ms", "kN"]
 
 
+CUT = {  # what stands above the rows "3,4,5" and "6,7,8": names, first column, the lines left out
+    "the first row": ("a,b,c\n1,2\n", ["a", "b", "c"], [3, 6], 1),
+    "the first two": ("a,b,c\n1,2\n1,\n", ["a", "b", "c"], [3, 6], 2),
+    "the second row": ("a,b,c\n0,1,2\n1,2\n", ["a", "b", "c"], [0, 3, 6], 1),
+    "a longer one": ("a,b,c\n0,1,2\n1,2,3,4\n", ["a", "b", "c"], [0, 3, 6], 1),
+    "below prose": ("Test 7\na,b,c\n1,2\n", ["a", "b", "c"], [3, 6], 1),
+    "below units": ("a,b,c\n(s),(N),(N)\n1,2\n", ["a", "b", "c"], [3, 6], 1),
+    "without a header": ("0,1,2\n1,2\n", ["1", "2", "3"], [0, 3, 6], 1),
+}
+
+
+@pytest.mark.parametrize("cut", CUT)
+def test_a_row_that_is_cut_near_the_header_costs_itself_alone(tmp_path, cut):
+    above, names, first, lost = CUT[cut]
+    path = tmp_path / "a.csv"
+    path.write_text(above + "3,4,5\n6,7,8\n")
+    found = read_table(path)
+    assert list(found.columns) == names
+    assert found.columns[names[0]].values.tolist() == first
+    assert sum(one.count for one in found.left) == lost
+
+
 NUMBERS = {  # cells, separator: 1234.5 and 0.25 in each habit
     "point": (("1234.5", "0.25"), ","),
     "decimal comma": (("1234,5", "0,25"), ";"),

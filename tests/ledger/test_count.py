@@ -581,6 +581,7 @@ def test_the_command_counts_and_its_page_shows_it(tmp_path, stretch, in_process,
     assert content["ends"] == min(left, key=left.__getitem__)
     page = (tmp_path / "p.html").read_text()
     assert "life used and left" in page and "joint_2" in page
+    # What picchio wrote into the folder is no log.
     done = in_process("count", NAME, "--log", tmp_path, "--ledger", "m", cwd=tmp_path)
     assert done.returncode == 2 and "holds no log" in done.stderr and not (tmp_path / "m").exists()
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import ctypes
 import hashlib
 import math
@@ -12,7 +11,7 @@ import shutil
 import stat
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -332,30 +331,3 @@ def regular_file(path: str | Path, *, limit: float = math.inf) -> Path:
         raise InputError(f"is too large ({found.st_size} bytes; at most {limit:.0f})", file=path)
     guard.reading([path])
     return Path(path)
-
-
-def csv_rows(
-    lines: Iterable[str], path: str | Path, *, delimiter: str = ",", first: int = 1
-) -> list[list[str]]:
-    """The cells of a table, a list a line.
-
-    Args:
-        lines: of the table, split as `str.splitlines` does: at a lone carriage return, too.
-        path: of its file, for messages.
-        delimiter: one letter between cells.
-        first: number of the first line in the file.
-
-    Returns:
-        a list of text a row.
-
-    Raises:
-        InputError: a cell too long to be one, with its line.
-    """
-    reader = csv.reader(lines, delimiter=delimiter)
-    rows: list[list[str]] = []
-    try:
-        rows.extend(reader)
-    except csv.Error as error:
-        where = f"line {first + reader.line_num - 1}"
-        raise InputError(f"is no CSV: {error}", file=path, key=where) from None
-    return rows

@@ -470,21 +470,26 @@ class _Sample:
         if not any(usual):
             return None
 
-        def row(k: int) -> bool:
+        def numbers(k: int) -> bool:
             cells = self.rows[k][1]
-            if len(cells) != self.width:
-                return False
-            own = [c for c, u in zip(cells, usual, strict=True) if u and not _NOTHING.fullmatch(c)]
+            own = [c for c, u in zip(cells, usual, strict=False) if u and not _NOTHING.fullmatch(c)]
             if not own:
-                return any(cells)
+                return any(cells) and len(cells) == self.width
             # A header may be called "1", but not all of it.
             return known(own[0]) and 2 * sum(map(known, own)) >= len(own)
+
+        def row(k: int) -> bool:
+            return len(self.rows[k][1]) == self.width and numbers(k)
 
         # The first line of numbers that another follows: prose above may hold a number, too.
         last = len(self.rows)
         begin = next((k for k in range(last) if row(k) and (k + 1 == last or row(k + 1))), None)
         if begin is None:
             return None
+        # Rows right above it may be cut: the table begins with a row, or below its header.
+        top = next((k + 1 for k in reversed(range(begin)) if not numbers(k)), 0)
+        if row(top) or (top and len(self.rows[top - 1][1]) == self.width):
+            begin = top
         below = self.rows[begin : begin + _LINES]
         body = [cells for _, cells in below if len(cells) == self.width]
         if decimal == "," or thousands:

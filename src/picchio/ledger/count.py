@@ -219,9 +219,7 @@ def _files(
         if not path.exists():
             raise InputError("no such file or folder", file=path)
         if path.is_dir():
-            files += sorted(
-                p for p in path.rglob("*") if p.suffix.lower() in ENDINGS and not p.is_dir()
-            )
+            files += sorted(p for p in path.rglob("*") if _may_be_log(p))
         else:
             files.append(regular_file(path))
     if not files:
@@ -241,6 +239,16 @@ def _files(
     rules_file = Path(mapping) if mapping is not None else beside
     rules = read_mapping(rules_file)
     return _unjoined(files, rules), rules, rules_file, ()
+
+
+def _may_be_log(path: Path) -> bool:
+    """Whether a file in a folder ends like a log and is no result of picchio's, with its format."""
+    if path.suffix.lower() not in ENDINGS or path.is_dir():
+        return False
+    if path.suffix.lower() != ".json" or not path.is_file():
+        return True
+    with open(path, "rb") as stream:
+        return b'"format": "picchio-' not in stream.read(200)
 
 
 def _how_to_map(file: Path, robot: FlexibleRobot) -> str:
