@@ -19,6 +19,7 @@ MODULE_OF = {
     "mcap-ros2-support": "mcap_ros2",
     "pydantic": "pydantic pydantic_core",
     "pillow": "PIL",
+    "mat-io": "matio",
     "rerun-sdk": "rerun",
 }
 # Distributions that conda-forge calls otherwise.

@@ -6,6 +6,7 @@ import io
 import sys
 import time
 from pathlib import Path
+from typing import get_type_hints
 
 import pytest
 
@@ -66,15 +67,15 @@ def test_what_was_written_is_said_once(picchio, tmp_path):
 
 def test_every_output_of_every_command_is_awaited():
     """An option whose help says that it writes is checked before any work, and told at the end."""
-    import typer
-
     from picchio.cli.main import app
 
     outputs = {"json", "report", "out", "plot", "model", "to", "html", "save"}
-    for name, command in typer.main.get_command(app).commands.items():
-        for param in command.params:
-            if param.name in outputs and (name, param.name) not in NO_OUTPUTS:
-                assert param.type.__class__.__name__ == "FuncParamType", (name, param.name)
+    for command in app.registered_commands:
+        name = command.name or command.callback.__name__
+        for key, hint in get_type_hints(command.callback, include_extras=True).items():
+            if key in outputs and (name, key) not in NO_OUTPUTS:
+                (option,) = hint.__metadata__
+                assert option.parser is not None, (name, key)
 
 
 # `explore --model` and so on are read; the two files of `start` have names of its own.
