@@ -539,7 +539,7 @@ def test_a_fleet_has_a_row_a_robot(tmp_path, robot, in_process):
 
 
 def test_what_other_programs_read(tmp_path, robot, stretch, monkeypatch):
-    """The examples of the page on counting, by the grammar of Prometheus and the constants of ROS."""
+    """The examples of the page on counting, by the grammar of Prometheus and ROS."""
     found = count(robot, stretch[2].parent / "logs", tmp_path / "l", sn_curve=str(stretch[2]))
     (tmp_path / "life.json").write_text(json.dumps(found.to_dict()))
     monkeypatch.chdir(tmp_path)
