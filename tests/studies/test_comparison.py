@@ -150,7 +150,7 @@ def test_page_and_table(folder, in_process, tmp_path, monkeypatch):
     hostile = json.loads((folder / "soft.json").read_text())
     hostile["verdict"]["reasons"] = ["<script>alert(1)</script>"]
     (tmp_path / "<b>.json").write_text(json.dumps(hostile))
-    done = in_process("compare", tmp_path / "<b>.json", folder / "strong.json", "--report",
+    done = in_process("compare", "-v", tmp_path / "<b>.json", folder / "strong.json", "--report",
                       tmp_path / "page.html", "--json", tmp_path / "out.json")  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert "task forward excitation: force, N" in done.stdout

@@ -187,7 +187,7 @@ def test_an_estimate_yields_an_interval_and_no_lone_number(
         math.log(2.0)
     )
     assert " to " in found.verdict.headline and "median" in found.verdict.headline
-    assert any("stiffness.joint_2" in line for line in found.verdict.reasons)
+    assert any("joint_2: stiffness is an estimate" in line for line in found.verdict.reasons)
     # What is known for sure has a life, and no interval.
     assert "life" not in assess(robot, task, sn_curve=STRAIGHT, steady_check=False).to_dict()
 
