@@ -678,6 +678,7 @@ def test_a_topic_that_is_silent_for_blocks_holds_its_value(robot, tmp_path, monk
     monkeypatch.setattr(importer, "blocks_isolated", blocks)
     links = {"/j:a": "position.joint_1", "/k:b": "position.joint_2", "/on:on": "trigger"}
     rules = Mapping.model_validate({"channel": [{"from": a, "to": b} for a, b in links.items()]})
+    (tmp_path / "x.mcap").touch()
     parts = list(read_samples(tmp_path / "x.mcap", rules, robot))
     assert sum(part.stamps.size for part in parts) == 4000
     stamps = np.concatenate([part.pose_stamps for part in parts])

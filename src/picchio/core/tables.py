@@ -333,6 +333,9 @@ def stream_blocks(
         first: number of the stream's first line in the file.
         told: what there is to say of it.
         numbers: columns that are taken for numbers whatever they hold.
+
+    Returns:
+        blocks of the table, in their order.
     """
     yield from _Reader(path, layout, told, numbers).blocks(stream, size, first)
 
@@ -740,6 +743,9 @@ def typed(
         habit: decimal sign, sign between thousands.
         kind: what they are, where that is known.
         unit: of the numbers.
+
+    Returns:
+        the column.
     """
     made = [_LOGICAL.get(cell.lower(), cell) for cell in cells]
     number = _PATTERNS[habit].fullmatch

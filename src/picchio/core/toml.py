@@ -52,6 +52,9 @@ FiniteVector = tuple[Finite, Finite, Finite]
 def read_toml(path: str | Path) -> dict[str, Any]:
     """The content of a TOML file.
 
+    Args:
+        path: the file.
+
     Raises:
         InputError: missing, not UTF-8, or a syntax error (with its line).
     """
@@ -86,6 +89,9 @@ def parse_toml(path: str | Path, model: type[T], *, format: str) -> T:
         path: the file.
         model: what it must look like, the `format` key left out.
         format: the version to accept, such as "picchio-task/1".
+
+    Returns:
+        the model.
 
     Raises:
         InputError: syntax, missing or unknown format, misspelt keys, wrong values.
@@ -131,7 +137,13 @@ def validate(
 def as_input_error(
     error: ValidationError, model: type[BaseModel], file: str | Path | None
 ) -> InputError:
-    """The most telling of pydantic's errors: a misspelt key explains a missing one."""
+    """The most telling of pydantic's errors: a misspelt key explains a missing one.
+
+    Args:
+        error: what pydantic raised.
+        model: that was wanted.
+        file: which the data came from.
+    """
     errors = error.errors(include_url=False, include_context=True)
     errors.sort(key=lambda e: 0 if e["type"] == "extra_forbidden" else 1)
     first = errors[0]
