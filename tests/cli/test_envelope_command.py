@@ -50,7 +50,6 @@ def test_a_pose_by_joint_names(picchio):
         (["--pose=0,0,0", "--width", "0.05"], "width"),
         (["--pose=0,0,0", "--period", "-1"], "--period"),
         (["--pose=0,0,0", "--hits", "0"], "hits"),
-        ([], "--pose"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_2(picchio, arguments, part):

@@ -36,7 +36,7 @@ def test_a_curve_that_assess_can_use(picchio, tests_file, tmp_path):
     curve = load_sn_curve(out)
     assert curve.survival == 0.975
     assert curve.endurance_limit == pytest.approx(found["design"]["value"], rel=0.01)
-    done = picchio("assess", "fanuc_like_3dof", "--sn-curve", out)
+    done = picchio("assess", "fanuc_like_3dof", "--sn-curve", out, "-v")
     assert done.returncode == 0, done.stderr
     assert "my-steel" in done.stdout
 

@@ -53,7 +53,7 @@ def test_a_column_is_in_the_unit_of_most():
     "command",
     [
         ["envelope", "--pose=0.1,0.3,0.1,0.4"],
-        ["assess"],
+        ["assess", "-v"],
         ["map", "--joint-grid", "2", "--out", "OUT"],
     ],
     ids=lambda command: command[0],
@@ -65,7 +65,7 @@ def test_tables_say_what_a_slide_is_measured_in(picchio, tables, gantry, tmp_pat
     # Two kinds alike: the head is that of the first, and the others carry their units. What the
     # drives bear is an estimate: assess tells loads only, as intervals.
     small = command[0] != "assess"
-    number = r" +[\d.]+" if small else r" +[\d.]+ to [\d.]+"
+    number = r" +[\d.]+" if small else r" +[\d.,]+ to [\d.,]+"
     for first, unit in (("joint", ("mm", "N")), ("rail", ("", "")), ("turn", ("mrad", "N m"))):
         cells = [f" +{text}" if first == "joint" else f"{number} ?{text}" for text in unit]
         assert re.search(rf"^{first}{''.join(cells[0 if small else 1 :])} ", done.stdout, re.M)
@@ -82,7 +82,7 @@ def test_pages_and_plots_say_it(gantry):
     found = api.assess(robot, task)
     page = api.report(found, robot=robot, task=task).html()
     cells = re.sub(r"<[^>]*>", " ", page)
-    assert re.search(r"turn\s+[\d.]+ to [\d.]+ N m", cells)  # what its drive bears is estimated
+    assert re.search(r"turn\s+[\d.,]+ to [\d.,]+ N m", cells)  # what its drive bears is estimated
     assert "mrad or mm" not in cells
     shafted = api.load_robot(gantry / "robot.urdf", allow_rigid=True)
     known = api.report(api.assess(shafted, task), robot=shafted, task=task).html()

@@ -39,6 +39,7 @@ from picchio.cli.output import begin, printable, say_warning, say_written
 from picchio.cli.reference import described, reproduce, robots  # noqa: F401
 from picchio.cli.waiting import waiting
 from picchio.core.errors import InputError, OutputError, PicchioError
+from picchio.core.guard import guard
 
 # Typer carries its own copy of click since 0.20: this is whichever it uses.
 _UsageError: Any = typer.BadParameter.__mro__[1]
@@ -98,6 +99,7 @@ def _watched(arguments: Sequence[str]) -> Any:
         with waiting.watched():
             return app(args=arguments, prog_name="picchio", standalone_mode=False)
     finally:
+        guard.begin(listen=False)  # what comes after the command is no matter of it
         say_written()
 
 
