@@ -77,7 +77,7 @@ def test_the_first_page(tmp_path, arm):
     assert [e.tag for e in top if e.tag in ("h1", "p", "div")][-2:] == ["p", "div"]
     # What entered, and where the material is from.
     whole = " ".join(tree.itertext())
-    assert "excitation: preload, N" in whole and "unverified" in whole
+    assert "excitation: preload, N" in whole and "engineering assumption, no source" in whole
     assert "@bottom-right" in page and "counter(pages)" in page
 
 

@@ -258,7 +258,7 @@ def test_what_all_sensors_have_alike_is_said_and_not_called_noise(case, capsys):
     assert "helped a little" not in text(html)
     show_diagnosis(diagnosis)
     said = " ".join(capsys.readouterr().out.split())
-    assert f"unexplained: {why}." in said
+    assert f"Unexplained: {why}." in said
     assert "but is not claimed: sensor_gain of deflection" in said
     assert "more than noise" not in said
     assert diagnosis.to_dict()["note"] == why
@@ -289,7 +289,7 @@ def test_the_residual_page_names_no_cause_but_shows_where(case, residual_page):
     assert len(rows) == sum(len(r.channels) for r in case.campaign)
     for heading in ("By frequency", "By time", "The torque that the model lacks",
                     "Frequency responses", "By pose", "By temperature",
-                    "By height of the blows"):  # fmt: skip
+                    "By peak force of the blows"):  # fmt: skip
         assert heading.lower() in said.lower(), heading
 
 

@@ -51,16 +51,20 @@ def test_bad_input_is_one_line_and_no_file(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_no_file_and_no_viewer_is_told(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["view", "fanuc_like_3dof"]) == 2
-    assert "--out" in capsys.readouterr().err
+def test_without_a_name_one_is_chosen_and_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run(["view", "fanuc_like_3dof"]) == 0
+    (made,) = tmp_path.iterdir()
+    assert made.suffix == ".html" and made.name in capsys.readouterr().err
 
 
 def test_an_input_is_not_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     task = tmp_path / "task.toml"
     task.write_text("format = 1")
     assert run(["view", "fanuc_like_3dof", "--task", str(task), "--out", str(task)]) == 2
-    assert "overwrite" in capsys.readouterr().err
+    assert "--out: this output has another ending" in capsys.readouterr().err
     assert task.read_text() == "format = 1"
 
 
