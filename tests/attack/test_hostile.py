@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 
 import pytest
@@ -134,8 +135,7 @@ CASES = {
         f"map {ARM} --points p.csv --out m.nc", ("p.csv", "must name one column"),
         {"p.csv": POINTS.replace("1.0,0.0", "1.0,0\r.0")},
     ),
-    "import-cell": imported(rows() + f"{LONG},1\n", "r.csv", "line 52"),
-    "import-cr": imported(rows().replace("7,", "7\r,"), "r.csv", "line 9"),
+    "import-cr": imported(rows().replace("7,", "7\r,"), "r.csv", "clock is not even"),
     "record-cell": recorded(rows(header="time [s],position.joint_1 [rad]") + f"{LONG},1\n",
                             "record[0]", "line 52"),
     "record-cr": recorded(rows(header="time [s],position.joint_1 [rad]").replace("7,", "7\r,"),
@@ -250,3 +250,13 @@ def test_refused_in_one_line(name, tmp_path, in_process):
     one_line(done, 2, *case.words)
     assert len(done.stderr) < 400, done.stderr
     assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_cell_without_end_is_left_out_and_told(tmp_path, in_process):
+    (tmp_path / "r.csv").write_text(rows() + f"{LONG},1\n")
+    (tmp_path / "m.toml").write_text(MAPPING)
+    done = in_process("import", "r.csv", "--mapping", "m.toml", "--to", "c", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "50 samples" in done.stdout
+    assert re.search(r"left out: .*in (line 52|sample 51)", done.stdout)
+    assert len(done.stdout) < 4000

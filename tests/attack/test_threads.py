@@ -72,9 +72,9 @@ def text(path):
 
 
 def test_a_warning_still_points_at_the_users_line():
-    with pytest.warns(picchio.PicchioWarning, match="wrist_1_link") as loaded:
-        picchio.load_robot("ur5")
     robot = picchio.load_robot("fanuc_like_3dof")
+    with pytest.warns(picchio.PicchioWarning, match="overdamped") as loaded:
+        picchio.load_robot("fanuc_like_3dof", values={"joint_1": {"damping_ratio": 1.5}})
     task = picchio.load_task(robot.task_path, robot)
     with pytest.warns(picchio.PicchioWarning, match="nie-2016") as assessed:
         picchio.assess(robot, task, method="paper", steady_check=False)

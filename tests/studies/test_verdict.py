@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import html
 import json
 import math
 
@@ -106,7 +107,7 @@ def test_the_part_that_governs(tmp_path, case):
     as_json = json.loads(json.dumps(found.to_dict()))["verdict"]
     assert as_json["headline"] == told.headline and as_json["status"] == status
     assert (as_json["margin"] is None) == (not math.isfinite(told.margin))
-    assert told.headline.replace("'", "&#x27;") in found._repr_html_()
+    assert html.escape(told.headline) in found._repr_html_()
 
 
 def test_every_reason_that_lowers_trust_is_told(tmp_path):

@@ -40,8 +40,8 @@ def test_verdict_table_and_reproduction(arm: SimpleNamespace, page: str) -> None
     for row, joint in zip(rows, arm.assessment.joints, strict=True):
         cells = [cell.text_content().strip() for cell in row.xpath("./th|./td")]
         assert cells[0] == joint.name
-        assert float(cells[1]) == pytest.approx(1e3 * joint.peak_deflection, rel=1e-3)
-        assert float(cells[4]) == pytest.approx(joint.peak_shear_stress / 1e6, rel=1e-3)
+        assert float(cells[1]) == pytest.approx(1e3 * joint.peak_deflection, rel=5e-3)
+        assert float(cells[4]) == pytest.approx(joint.peak_shear_stress / 1e6, rel=5e-3)
         assert float(cells[6]) == pytest.approx(100 * joint.utilisation, rel=1e-2)
     everything = text_of(tree, "//body")
     for line in arm.assessment.assumptions:
@@ -139,7 +139,7 @@ def test_the_papers_method_has_an_end(arm: SimpleNamespace) -> None:
     found = picchio.assess(arm.robot, arm.task, method="paper")
     page = assessment_report(found, arm.robot, arm.task)
     verdict = text_of(lxml_html.fromstring(page), "//*[@id='verdict']")
-    assert "233,600,000 rivets" in verdict
+    assert "234,000,000 rivets" in verdict
     assert "Where the life goes" not in verdict
     assert "Damage a rivet does" in page
 
@@ -217,7 +217,7 @@ def test_reducers_are_shown_beside_the_shafts(arm: SimpleNamespace) -> None:
     assert "137" in text_of(tree, "(//table)[1]/tbody/tr[1]")
     row = text_of(tree, "//table[@id='reducers']/tbody/tr[1]")
     assert "RV-80E-121" in row
-    assert "137" in row and "2685" in row and "1960" in row
+    assert "137" in row and "2,685" in row and "1,960" in row
     assert "repeated peak torque" in row
     (line,) = tree.xpath("//*[@aria-label='Reducers']/li")
     assert line.text_content() == "joint_1, joint_2, joint_3: <too> much"

@@ -47,7 +47,7 @@ def test_what_a_click_tells_is_what_was_assessed(scene, arm) -> None:
     numbers = [float(x) for x in re.findall(r"-?\d+\.?\d*(?:e-?\d+)?", told["pose"])]
     np.testing.assert_allclose(numbers, first.poses[0], atol=5e-4)
     use = np.fmax(first.utilisation[0], first.reducer_utilisation[0])
-    assert float(told["used"].split()[0]) == pytest.approx(100 * np.nanmax(use), rel=5e-3)
+    assert float(told["utilisation"].split()[0]) == pytest.approx(100 * np.nanmax(use), rel=5e-3)
     for k, joint in enumerate(arm.robot.flexible_joints):
         rows = {row[0]: row for row in scene.joints[k]["card"]["rows"]}
         assert rows["stiffness"][1].startswith(f"{joint.stiffness:.4g}")
