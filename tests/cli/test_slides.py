@@ -13,8 +13,9 @@ from picchio.robot.units import SLIDING, column
 
 URDF = """<robot name="gantry"><link name="base"/>{joints}</robot>"""
 LINK = """<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{name}_link"/>
-<origin xyz="0 0 0.4"/><axis xyz="{axis}"/><limit lower="-1" upper="1" effort="{mass}e2" velocity="1"/>
-</joint><link name="{name}_link"><inertial><origin xyz="0.1 0 0.2"/><mass value="{mass}"/>
+<origin xyz="0 0 0.4"/><axis xyz="{axis}"/>
+<limit lower="-1" upper="1" effort="{mass}e2" velocity="1"/></joint>
+<link name="{name}_link"><inertial><origin xyz="0.1 0 0.2"/><mass value="{mass}"/>
 <inertia ixx="0.2" ixy="0" ixz="0" iyy="0.{mass}" iyz="0" izz="0.1"/></inertial></link>"""
 JOINTS = [("rail", "prismatic", "1 0 0", 20), ("turn", "revolute", "0 0 1", 11),
           ("lift", "prismatic", "0 0 1", 7), ("wrist", "revolute", "0 1 0", 3)]  # fmt: skip
