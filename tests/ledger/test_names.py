@@ -130,3 +130,37 @@ def test_an_accelerometer_that_reads_gravity_tells_blows(tmp_path, robot):
     assert all((blow.direction == [0.0, 0.0, 1.0]).all() for blow in blows)
     peaks = np.array([blow.peak for blow in blows])
     np.testing.assert_allclose(peaks, made[0].peaks, rtol=0.15)
+
+
+@pytest.mark.parametrize("names", ["q{}", "joint_{}", "actual_q_{}", "J{}", "q{} [deg]"])
+@pytest.mark.parametrize(
+    "switch", ["tool_on", "digital_out", "actual_digital_output_bits", "DO[3]"]
+)
+def test_joints_and_the_switch_are_guessed_without_a_robot(tmp_path, names, switch):
+    series = {names.format(k): np.linspace(0.0, 0.1 * k, 40) for k in (1, 2, 3)}
+    series |= {switch: np.arange(40) // 20 % 2, "tool_ready": np.ones(40)}
+    pandas.DataFrame({"time": np.arange(40) / 100.0, **series}).to_csv(
+        tmp_path / "a.csv", index=False
+    )
+    found = {one.series: one for one in named(read_raw(tmp_path / "a.csv"))}
+    assert [found[n].to for n in series] == [*(f"position.joint_{k}" for k in (1, 2, 3)),
+                                             "trigger", ""]  # fmt: skip
+    assert all("place in an array" in found[names.format(k)].why for k in (1, 2, 3))
+    assert "switch" in found[switch].why
+
+
+@pytest.mark.parametrize(
+    "columns",
+    [
+        {"tool_on": [0, 1, 0, 1], "gun_active": [0, 0, 1, 1]},  # two: which one nobody knows
+        {"digital_out": [0, 0, 0, 0]},
+        {"digital_out_bits": [0, 64, 0, 64]},
+        {"a1": [0.1, 0.2, 0.3, 0.4], "a2": [0.1, 0.2, 0.3, 0.4]},  # analogue inputs, or joints
+        {"q1": [0.1, 0.2, 0.3, 0.4]},
+    ],
+)
+def test_what_may_be_two_things_is_not_guessed(tmp_path, columns):
+    pandas.DataFrame({"time": [0.0, 0.1, 0.2, 0.3], **columns}).to_csv(
+        tmp_path / "a.csv", index=False
+    )
+    assert not any(one.to for one in named(read_raw(tmp_path / "a.csv")))

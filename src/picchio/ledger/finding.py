@@ -24,7 +24,7 @@ from picchio.studies.rivet.pose import ModelAtPose
 from picchio.studies.tasks import Operation, Task
 from picchio.vibration.closed_form.response import unit_vector
 
-_SHARE = 0.2  # of the task's force: what a blow exceeds where nobody says
+SHARE = 0.2  # of the task's force: what a blow exceeds where nobody says
 _FOOT = 0.1  # of the threshold
 _AT_REST = 12.0  # m/s^2: an accelerometer reads gravity, and its noise
 NEAR = 0.02
@@ -49,7 +49,7 @@ def stream_of(samples: Samples, rules: Mapping, task: Task, robot: FlexibleRobot
     if threshold is None and kind in ("trigger", "poses"):
         threshold = 0.5
     if threshold is None and kind == "force":
-        threshold = _SHARE * max(op.excitation.peak_force for op in task.operations)
+        threshold = SHARE * max(op.excitation.peak_force for op in task.operations)
     told = asked.model_dump(mode="json") if asked else {}
     settings = {k: told.get(k) for k in ("direction", "frame", "trigger", "operation")}
     rest = 0.0
@@ -64,7 +64,7 @@ def stream_of(samples: Samples, rules: Mapping, task: Task, robot: FlexibleRobot
                 raise InputError(f"say what the reading exceeds in a blow: the task's blows are "
                                  f"{weakest:.3g} m/s^2, which gravity hides",
                                  key="blows.threshold", hint="such as 100.0, m/s^2")  # fmt: skip
-            threshold = float(f"{max(_SHARE * weakest, 1.25 * rest):.2g}")
+            threshold = float(f"{max(SHARE * weakest, 1.25 * rest):.2g}")
     assert threshold is not None
     usual = min(max(_FOOT * threshold, rest), threshold)
     foot = asked.foot if asked and asked.foot else usual

@@ -47,7 +47,7 @@ def jolts(
     if time.size < 2:
         return []
     step = max(width / _CELLS, float(np.median(np.diff(time))))
-    cells = _averaged(time, values, step)
+    cells = averaged(time, values, step)
     cells -= np.median(cells, axis=0)
     lag = max(round(width / step), 1) + 1
     memory = int(min(_MEMORY, max(2.0, 0.5 * period / step - 2 * lag)))
@@ -56,7 +56,10 @@ def jolts(
     if not size.max() > threshold:
         return []
     each = int(period / step)
-    moves = maximum_filter1d(np.linalg.norm(cells, axis=1), each + 1) > threshold
+    around = maximum_filter1d(np.linalg.norm(cells, axis=1), each + 1)
+    moves = around > threshold
+    # What tells the ringing has the blow itself in it for a while: then far too much is told.
+    size = np.minimum(size, around)
     along = (quick @ quick[int(size.argmax())])[moves]
     if (along**4).mean() < _PEAKED * (along**2).mean() ** 2:
         return None
@@ -74,8 +77,14 @@ def jolts(
     return found if moves.sum() * step < (_RINGS + period) * len(found) else None
 
 
-def _averaged(time: FloatArray, values: FloatArray, step: float) -> FloatArray:
-    """(n, k) means over cells of `step` s, of straight lines between samples."""
+def averaged(time: FloatArray, values: FloatArray, step: float) -> FloatArray:
+    """(n, k) means over cells of `step` s, of straight lines between samples.
+
+    Args:
+        time: (m,) s, ascending.
+        values: (m, k) any unit.
+        step: s.
+    """
     edges = time[0] + step * np.arange(max(int((time[-1] - time[0]) / step), 1) + 1)
     areas = 0.5 * (values[1:] + values[:-1]) * np.diff(time)[:, None]
     whole = np.vstack([np.zeros(values.shape[1]), np.cumsum(areas, axis=0)])

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +15,7 @@ from picchio.campaign.channels import LOG_KINDS, patterns
 from picchio.campaign.importing.detect import clock, rate_and_gaps
 from picchio.campaign.importing.importer import read_raw
 from picchio.campaign.importing.mapping import FORMAT, TimeTable
-from picchio.campaign.importing.named import Named, named
+from picchio.campaign.importing.named import Named, accelerometers, named
 from picchio.campaign.importing.raw import RawChannel, RawFile
 from picchio.campaign.importing.resample import clocked
 from picchio.core.errors import InputError
@@ -21,11 +23,33 @@ from picchio.core.files import write_text
 from picchio.core.tables import TextLayout, sniffed
 
 
+@dataclass(frozen=True)
+class Answers:
+    """What no file tells, and a person was asked.
+
+    Attributes:
+        robot: its name or URDF.
+        frame: that the accelerometer is fixed to.
+        unit: of its readings, where the file does not tell it.
+        start: when the clock was at zero.
+        pose: rad or m, where the robot stood.
+        threshold: m/s^2, what the accelerometer reads more than in a blow.
+    """
+
+    robot: str | None = None
+    frame: str | None = None
+    unit: str | None = None
+    start: datetime | None = None
+    pose: tuple[float, ...] | None = None
+    threshold: float | None = None
+
+
 def write_mapping(
     file: str | Path,
     out: str | Path,
     joints: Collection[str] | None = None,
     frames: Collection[str] | None = None,
+    answers: Answers = Answers(),
 ) -> list[Named]:
     """Write a mapping to start from, for a file that is to be imported.
 
@@ -34,6 +58,7 @@ def write_mapping(
         out: where the mapping goes; a file that stands there is left alone.
         joints: of the robot; None where it is not known.
         frames: likewise.
+        answers: what a person told.
 
     Returns:
         what the names and units of the series say; the others are left to be filled in.
@@ -45,11 +70,21 @@ def write_mapping(
         raise InputError("exists already and is left alone", file=out)
     raw = read_raw(file)
     known = named(raw, joints, frames)
-    write_text(out, mapping_template(raw, known))
+    sensors = accelerometers(raw) if answers.frame else []
+    told = {
+        entry.series: entry for one in sensors[:1] for entry in one.entries(answers.frame or "")
+    }
+    known = [
+        Named(one.series, mine.to, mine.unit or answers.unit, "as answered")
+        if (mine := told.get(one.series)) else one for one in known
+    ]  # fmt: skip
+    write_text(out, mapping_template(raw, known, answers))
     return known
 
 
-def mapping_template(raw: RawFile, known: Sequence[Named] | None = None) -> str:
+def mapping_template(
+    raw: RawFile, known: Sequence[Named] | None = None, answers: Answers = Answers()
+) -> str:
     """The text of a `picchio-mapping/1` file that lists the series.
 
     Those whose names and units say what they are stand ready, the others are commented out.
@@ -57,7 +92,15 @@ def mapping_template(raw: RawFile, known: Sequence[Named] | None = None) -> str:
     Args:
         raw: as `read_raw` gives it.
         known: as `named` gives it; it is asked without a robot where None.
+        answers: what a person told.
     """
+    start = answers.start and f"start = {answers.start.isoformat()}   # when the clock was at zero"
+    robot = answers.robot and f"robot = {_quoted(answers.robot)}"
+    blows = {
+        "threshold": (answers.threshold, "m/s^2: a fifth of the largest reading"),
+        "pose": (answers.pose and list(answers.pose), "rad or m, where the log has none"),
+    }
+    told_blows = [f"{key} = {value}   # {why}" for key, (value, why) in blows.items() if value]
     told_of = {one.series: one for one in (named(raw) if known is None else known)}
     times, told = _time(raw)
     lines = [
@@ -71,6 +114,7 @@ def mapping_template(raw: RawFile, known: Sequence[Named] | None = None) -> str:
         "",
         "[time]",
         *times,
+        *([start] if start else []),
         "# zero = 0.0               # s: this time becomes t = 0, the first edge of the first blow",
         "",
         "[record]                   # the keys of a campaign's [[record]]",
@@ -80,11 +124,12 @@ def mapping_template(raw: RawFile, known: Sequence[Named] | None = None) -> str:
         "# hits = 12",
         "",
         "[campaign]                 # the keys of campaign.toml",
-        '# robot = "fanuc_like_3dof"',
+        robot or '# robot = "fanuc_like_3dof"',
         "# excitation = { kind = 'pulse_train', force = 300.0, period = 0.040, width = 0.004 }",
         "",
-        "# [blows]                  # for picchio count; else told by the task",
-        "# threshold = 100.0        # N; of an acceleration m/s^2",
+        ("" if told_blows else "# ")
+        + "[blows]                  # for picchio count; else the task's",
+        *(told_blows or ["# threshold = 100.0        # N; of an acceleration m/s^2"]),
         '# operation = "..."        # of the task, where it has several',
         '# frame = "tool"           # or "world": the axes of force.x, .y, .z',
         "",

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
 from picchio.campaign.channels import kinds
-from picchio.core.arrays import FloatArray
+from picchio.core.arrays import FloatArray, IndexArray
 from picchio.ledger.samples import Samples
 from picchio.ledger.store import Stream, pieces
 from picchio.model.model import Model
@@ -19,7 +20,7 @@ _LATER = 0.01  # s after the last sample of a blow
 _EACH = 20  # ring-downs of a stretch: more make no reading much better
 _SAMPLES = 800  # of one
 _STILL = 2e-3  # rad or m
-_TOLD = 0.02  # relative: a frequency that is known no better says nothing
+TOLD = 0.02  # relative: a frequency that is known no better says nothing
 
 
 def ring_downs(samples: Samples, stream: Stream, model: Model) -> list[tuple[str, int, float]]:
@@ -44,14 +45,7 @@ def ring_downs(samples: Samples, stream: Stream, model: Model) -> list[tuple[str
     size = stream.size(samples.values)
     for piece in pieces(samples.stamps, stream.gap):
         stamps = samples.stamps[piece]
-        active = np.flatnonzero(size[piece] > stream.foot)
-        if not active.size:
-            continue
-        quiet = np.flatnonzero(np.diff(np.append(stamps[active], stamps[-1])) > _SHORTEST * 1e9)
-        for k in quiet:
-            begin = int(stamps[active[k]] + _LATER * 1e9)
-            after = stamps[active[k + 1]] if k + 1 < active.size else stamps[-1]
-            end = int(min(after, begin + _LONGEST * 1e9))
+        for begin, end in silences(stamps[size[piece] > stream.foot], int(stamps[-1])):
             told = _ring(read, begin, end, samples, model)
             if told is not None:
                 found += told
@@ -59,6 +53,23 @@ def ring_downs(samples: Samples, stream: Stream, model: Model) -> list[tuple[str
             if count >= _EACH:
                 return found
     return found
+
+
+def silences(active: IndexArray, last: int) -> Iterator[tuple[int, int]]:
+    """The time after blows in which a structure rings and nothing else happens, at most 2 s each.
+
+    Args:
+        active: (m,) ns, ascending, of samples while a blow lasts.
+        last: ns, of the last sample.
+
+    Yields:
+        ns, where one begins and ends.
+    """
+    after = np.append(active[1:], last)
+    for begin, end in zip(active.tolist(), after.tolist(), strict=active.size > 0):
+        if end - begin > _SHORTEST * 1e9:
+            begin += round(_LATER * 1e9)
+            yield begin, min(end, begin + round(_LONGEST * 1e9))
 
 
 def temperatures(samples: Samples) -> list[tuple[str, int, float]]:
@@ -112,7 +123,7 @@ def _ring(
         return None
     frequency, error, damping = fitted
     told: list[tuple[str, int, float]] = []
-    for i in np.flatnonzero(error < _TOLD):
+    for i in np.flatnonzero(error < TOLD):
         told += [(f"f{i}", begin, float(frequency[i])), (f"e{i}", begin, float(error[i])),
                  (f"z{i}", begin, float(damping[i]))]  # fmt: skip
     if told:

@@ -104,7 +104,7 @@ def render(template: str, **content: Any) -> str:
     environment = page_environment()
     # What most pages leave empty.
     nothing = ("at", "tone", "scene", "moves", "ask", "stiffness", "channels", "warnings",
-               "traces")  # fmt: skip
+               "traces", "pictures", "sentences")  # fmt: skip
     environment.globals.update(dict.fromkeys(nothing, ""), level=2, version=package_version())
     return environment.get_template(template).render(**content)
 
@@ -240,10 +240,13 @@ def report(
     return Report(title, page(*asked.args, **asked.kwargs))
 
 
-def plain_page(result: Result, *, command: str | None = None, warnings: Sequence[str] = ()) -> str:
+def plain_page(
+    result: Result, *, command: str | None = None, warnings: Sequence[str] = (), **shown: Any
+) -> str:
     """The page of a result that has none of its own: what a notebook shows, and its inputs."""
     return render(
         "plain.html.j2",
+        **shown,
         headline=result._headline(),
         body=Markup(unfolded(result._repr_html_())),
         command=command,
