@@ -66,7 +66,7 @@ def _motion(file, rng):
         "torque.joint_1": 500 * np.gradient(np.gradient(q, time), time) + noise(5.0),
         "temperature.joint_1": 30.0 + 0.1 * time + noise(0.01),
     }
-    return Part(file, time, arrays, {"kind": "motion"})
+    return Part(file, time, arrays, {"kind": "motion", "pose": {"joint_3": 0.0}})
 
 
 def sound(seed=0):

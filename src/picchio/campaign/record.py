@@ -26,6 +26,7 @@ from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.core.toml import validate
 from picchio.excitation.excitation import Excitation
+from picchio.robot.flexible_robot import FlexibleRobot
 
 BLOCK = 16384
 LAYOUTS = {
@@ -170,6 +171,22 @@ class Record:
     def pose(self) -> dict[str, float] | list[float] | None:
         """Link-side joint positions (rad or m), as `FlexibleRobot.pose` takes them."""
         return self.table.pose
+
+    def standing(self, robot: FlexibleRobot) -> dict[str, float | None]:
+        """Joints whose angle was not recorded -> where `pose` says they stand, None if nowhere.
+
+        Args:
+            robot: whose joints count.
+
+        Raises:
+            InputError: a pose that does not fit the robot.
+        """
+        channels = [self.channel(name) for name in self.channels]
+        seen = {c.subject for c in channels if c.kind.motion in ("link", "motor")}
+        given = self.pose or {}
+        at = dict(zip(robot.joint_names, robot.pose(given).tolist(), strict=True))
+        stated = given if isinstance(given, dict) else robot.joint_names
+        return {j: at[j] if j in stated else None for j in at if j not in seen}
 
     @property
     def direction(self) -> FloatArray | None:

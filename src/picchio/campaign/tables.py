@@ -198,8 +198,8 @@ class RecordTable(StrictModel):
             "static" (a row a loading: weights and pulls, and what moved), "frf" (a row a
             line of one frequency response function) or "clamped" (the tool is held, and motors
             press).
-        pose: rad or m, by joint name or in the robot's joint order; not of motion. Of a static
-            record: of the joints that have no column.
+        pose: rad or m, by joint name or in the robot's joint order; of a static
+            or motion record, of the joints that have no column.
         force_direction: frf only: the way of the force, world, of any length.
         force_point: m, frf only: where it acts, in `force_frame`; else where the tool's force does.
         force_frame: frf only: the frame of that point; the tool's where it is left out.
@@ -261,7 +261,7 @@ class RecordTable(StrictModel):
     def percussion_keys(self) -> list[str]:
         """The keys given here that only a percussion record has a use for."""
         names = ("pose", "direction", "excitation", "hits", "force", "period", "width", "preload")
-        kept = ("pose",) if self.kind in ("static", "frf", "clamped") else ()
+        kept = () if self.kind == "percussion" else ("pose",)
         return [name for name in names if name not in kept and getattr(self, name) is not None]
 
     def frf_keys(self) -> list[str]:

@@ -247,8 +247,10 @@ class Gain:
         """(baseline^2 - extended^2) / (baseline^2 - floor^2), 1 at most.
 
         None where nothing is to explain, or no more than noise may be off by itself: a share of
-        that would say nothing.
+        that would say nothing. Nor does one where more is left than the signal.
         """
+        if self.extended_nrmse >= 1.0:
+            return None
         to_explain = self.baseline_nrmse**2 - self.noise_floor_nrmse**2
         if to_explain <= _SCATTER * self.noise_floor_nrmse**2:
             return None
@@ -263,9 +265,15 @@ class Gain:
         )
         way = "falls" if self.extended_nrmse < self.baseline_nrmse else "rises"
         change = f"stays at {was}" if was == now else f"{way} from {was} to {now}"
-        share = 100.0 * (self.explained or 0.0)
-        explained = f": {share:.1f} % of what is wrong is explained" if share > 0.0 else ""
-        return f"the error {change} of the signal (noise alone: {noise}){explained}"
+        share = (
+            f": {self.share} of what is wrong is explained" if (self.explained or 0.0) > 0.0 else ""
+        )
+        return f"the error {change} of the signal (noise alone: {noise}){share}"
+
+    @property
+    def share(self) -> str:
+        """How much is explained, in words: never rounded up to all of it."""
+        return f"{math.floor(1000.0 * (self.explained or 0.0)) / 10.0:.1f} %"
 
     def to_dict(self) -> dict[str, Any]:
         """As in JSON."""
@@ -431,7 +439,7 @@ class Diagnosis(Result):
         if len(named) > _SHOWN:
             text += f" and {len(named) - _SHOWN} more"
         if self.gain is not None and self.gain.explained is not None and self.causes:
-            text += f"; {100.0 * self.gain.explained:.1f} % of the error explained"
+            text += f"; {self.gain.share} of the error explained"
         return text
 
     def _repr_html_(self) -> str:

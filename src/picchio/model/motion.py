@@ -37,6 +37,7 @@ class Motion:
         tool: the tool frame.
         loads: frame -> joint -> (m, 10) torque for one of each of the ten numbers, as in
             `picchio.model.inertia`, of a body fixed in the frame.
+        weight: joint -> torque that holds the bodies against gravity, N m: part of `body`.
         link: link -> (10,) those numbers of the link by the robot's files, in its frame.
     """
 
@@ -51,6 +52,7 @@ class Motion:
     tool: str
     loads: Callable[[str], Mapping[str, FloatArray]]
     link: Callable[[str], FloatArray]
+    weight: Callable[[], Mapping[str, FloatArray]] = dict
     added: list[tuple[str, str, FloatArray]] = field(default_factory=list)
     gains: dict[str, float] = field(default_factory=dict)
     delays: dict[str, float] = field(default_factory=dict)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -19,9 +20,14 @@ from picchio.robot.joint import Joint
 from picchio.robot.masses.check import check_mass_at
 from picchio.robot.spread import Posterior, Spread
 from picchio.robot.tool import Gun, Mounting, Tool
+from picchio.robot.units import SLIDING
 from picchio.robot.urdf.tree import UrdfTree
 
 Array = NDArray[np.float64]
+_MATTERS = 0.05  # of a weight or an inertia: less is within what models are off by
+_POSES = 20  # drawn to see whether one joint's weight depends on another
+_TURN = 2.0  # rad or m: as far as those go
+_BEYOND = 1.0  # m beyond its tool frame, which what an arm holds may reach
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -249,6 +255,46 @@ class FlexibleRobot:
         gradient = self.rigid.gravity_gradient(full)[np.ix_(index, index)]
         _, balanced = balancing(self.flexible_joints, self.tree, full[index])
         return gradient + np.diag(balanced)
+
+    def largest_inertia(self, joint: str) -> float:
+        """What the whole arm has about a joint when it is stretched out, at the most, kg m^2.
+
+        Args:
+            joint: its name; of one that slides nothing is said.
+        """
+        place = self.tree.joints.get(joint)
+        if place is not None and place.units is SLIDING:
+            return math.inf
+        return self.rigid.total_mass() * (self.rigid.length(self.tool_frame) + _BEYOND) ** 2
+
+    def resting_on(self, unknown: Collection[str]) -> list[str]:
+        """Joints whose weight or inertia depends on where some others stand.
+
+        Args:
+            unknown: the others.
+        """
+        names, rng = self.joint_names, np.random.default_rng(0)
+        apart = [name in unknown for name in names]
+        if not any(apart):
+            return []
+        low, high = np.clip([self.lower, self.upper], -_TURN, _TURN)
+        poses = rng.uniform(low, high, (_POSES, len(names)))
+        still = np.zeros_like(poses)
+        others = np.where(apart, rng.uniform(low, high, poses.shape), poses)
+        size = [
+            np.stack(
+                [
+                    self.rigid.inverse_dynamics(q, still, still),
+                    np.diagonal([self.rigid.mass_matrix(each) for each in q], 0, 1, 2),
+                ]
+            )
+            for q in (poses, others)
+        ]
+        change = np.abs(size[1] - size[0]).max(axis=1)
+        most = np.abs(size).max(axis=(0, 2))
+        # A weight that is next to nothing beside the arm's largest does not matter.
+        rests = change > _MATTERS * np.maximum(most, _MATTERS * most.max(axis=1, keepdims=True))
+        return [n for n, a, b in zip(names, apart, rests.any(axis=0), strict=True) if b and not a]
 
     def link_of(self, frame: str) -> str:
         """The link whose frame this is: a link's name, or a joint's for the link it carries.

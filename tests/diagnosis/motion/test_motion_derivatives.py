@@ -46,6 +46,8 @@ EVERYTHING = (
     ("coupled_drive", "joint_3", {"coefficient": 2.0, "torque": 1.0, "inertia": 0.3}),
     ("counterbalance", "joint_2", {"cosine": 30.0, "sine": -12.0, "spring": 5.0}),
     ("encoder_delay", "motor_position", {"delay": 0.0031}),
+    ("missing_gravity", "torque", {"share": 0.9}),
+    ("unknown_pose", "joint_3", {"cosine": 4.0, "sine": -7.0}),
     ("joint_stiffness", "joint_2", {"scale": 0.8}),
     ("backlash", "joint_1", {"gap": 2e-4}),
 )
@@ -65,7 +67,7 @@ def test_it_is_the_difference_of_two_predictions(system, number, alone):
     state = State(effects=(own,) if alone else tuple(effects), scales={"joint_2": 1.03})
     predicted = system.predict(state.every, state.scales)
     index = 0 if alone else number
-    wanted = [c for c in state.coordinates(RATE) if c.index == index]
+    wanted = [c for c in state.coordinates(system) if c.index == index]
     kept, columns = jacobian(system, state, predicted, wanted)
     assert kept
     for c, column in zip(kept, columns.T, strict=True):
@@ -79,7 +81,7 @@ def test_a_factor_on_the_bodies_torque_is_one_too(system):
     effects = [effect_class(name)(target, **values) for name, target, values in EVERYTHING]
     state = State(effects=tuple(effects), scales=dict.fromkeys(JOINTS, 1.02))
     predicted = system.predict(state.every, state.scales)
-    wanted = [c for c in state.coordinates(RATE) if c.index < 0]
+    wanted = [c for c in state.coordinates(system) if c.index < 0]
     kept, columns = jacobian(system, state, predicted, wanted)
     assert len(kept) == 3
     for c, column in zip(kept, columns.T, strict=True):

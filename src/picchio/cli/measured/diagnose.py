@@ -170,9 +170,13 @@ def show_diagnosis(found: Diagnosis, plan: Path | None = None) -> None:
     )
     for effect, target in found.leads:
         out.print(f"  {helped}: {effect} of {target}")
-    for why in dict.fromkeys(found.not_looked_for.values()):
-        names = ", ".join(name for name, reason in found.not_looked_for.items() if reason == why)
-        out.print(f"  not looked for: {names} ({why})")
+    for head, told in (
+        ("not recorded", found.extra.get("not_recorded", {})),
+        ("not looked for", found.not_looked_for),
+    ):
+        for why in dict.fromkeys(told.values()):
+            names = ", ".join(name for name, reason in told.items() if reason == why)
+            out.print(f"  {head}: {names} ({why})")
     if found.remainder is not None:
         out.print(f"  {found.remainder.told}")
     if found.told_without:

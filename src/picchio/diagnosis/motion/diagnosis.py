@@ -18,7 +18,7 @@ from picchio.diagnosis.motion.conclude.holdout import (
 )
 from picchio.diagnosis.motion.conclude.values import correlation, nuisances, parameters
 from picchio.diagnosis.motion.criteria.holdout import validate
-from picchio.diagnosis.motion.criteria.score import Scorer, necessity
+from picchio.diagnosis.motion.criteria.score import Scorer, borne_out, necessity, passes
 from picchio.diagnosis.motion.data.noise import noise_levels
 from picchio.diagnosis.motion.data.split import split
 from picchio.diagnosis.motion.data.system import Group, System
@@ -147,12 +147,14 @@ def _conclude(search: _Search, found: Fit) -> Diagnosis:
     system, judge_on, before = search.system, search.judge_on, search.before
     noise = noise_levels(system)
     outer = {**noise, **noise_levels(judge_on)} if judge_on is not system else noise
-    groups = judged_groups(judge_on, found)
+    groups, shown = judged_groups(judge_on, found), evidence_of(system)
     gain = judge(judge_on, before.state, found.state, outer, groups, system)
     scorer = Scorer(system, found)
     sure = []
-    for index in range(len(found.state.effects)):
+    for index, effect in enumerate(found.state.effects):
         score = necessity(scorer, index)
+        if score is None or not passes(score, effect.periodic, there=True):
+            score = borne_out(scorer, index, fit(system, found.state.without(index)))
         sure.append(min(_SURE, score.confidence) if score is not None else 0.5)
     rivals = alternatives(system, found, search.kinds)
     valued = zip(found.state.effects, sure, strict=True)
@@ -194,7 +196,9 @@ def _conclude(search: _Search, found: Fit) -> Diagnosis:
         ),
         note=note,
         correlation=correlation(found),
+        not_looked_for={n: why for n, k in search.kinds.items() if (why := k.why_not(shown))},
         extra={
+            "not_recorded": not_recorded(system, judge_on),
             "channels": told if judge_on is not system else [],
             "stiffness": _stiffness(system, found, causes),
             "dropped": [
@@ -204,6 +208,27 @@ def _conclude(search: _Search, found: Fit) -> Diagnosis:
         },
         details=_details(search, found, outer),
     )  # fmt: skip
+
+
+def not_recorded(*systems: System) -> dict[str, str]:
+    """Joints without an angle -> in which records, where they stand, and whether that matters.
+
+    Args:
+        systems: all equations.
+    """
+    places: dict[str, dict[str, list[str]]] = {}
+    needed = ", ".join(dict.fromkeys(joint for system in systems for joint in system.unposed))
+    matters = f"the load of {needed} depends on it" if needed else "no load depends on it"
+    for log in {log.file: log for system in systems for log in system.logs}.values():
+        for joint, at in log.standing.items():
+            where = f"it stands at {at:.4g} by the record's `pose`"
+            if joint in log.unknown:
+                where = f"taken to stand at 0 ({matters}): say where as `pose` of the record"
+            places.setdefault(joint, {}).setdefault(where, []).append(log.file)
+    return {
+        joint: "; ".join(f"no angle in {', '.join(files)}: {at}" for at, files in found.items())
+        for joint, found in places.items()
+    }
 
 
 def _verdict(system: System, before: Fit, found: Fit, noise: Mapping[Group, float],

@@ -54,7 +54,8 @@ class Parameter:
         by_inverse: of one that is neutral at infinity: whether half of it does twice as much.
         shape: whether it says where or how, not how much: by itself it changes nothing.
         whole: whether it is a whole number: tried, not fitted.
-        spread: what is known beforehand: its standard deviation about `neutral`; 0: nothing.
+        spread: what is known beforehand: its standard deviation about `centre`; 0: nothing.
+        centre: what that is about; `neutral` where None.
         moving: the smallest value that a motion may tell; as `lower` where None.
     """
 
@@ -72,6 +73,7 @@ class Parameter:
     shape: bool = False
     whole: bool = False
     spread: float = 0.0
+    centre: float | None = None
     moving: float | None = None
 
     def size_beside(self, typical: float) -> float:
@@ -168,6 +170,9 @@ class Effect(ABC):
         over: effects on joints that do in each joint by themselves what this one does: in a motion
             it has to gain beside all of them, found or not. What couples joints is told by that.
         beside: parameters of which bodies may do as much: in a motion, the others have to gain.
+        weighs: in a motion, it is told by what bodies weigh: not where nobody says how they stand.
+        within: in a motion, parameter -> (effect, parameter) at the same target, which it is no
+            larger than: friction does not push.
         everywhere: in a motion, it gains in each channel that it acts in, or is not there.
         usual: where effects explain a motion equally well, the smallest comes first.
         elastic: in a motion, it winds the gear up, which is looked for once loads are known.
@@ -206,6 +211,8 @@ class Effect(ABC):
     refines: ClassVar[str] = ""
     over: ClassVar[tuple[str, ...]] = ()
     beside: ClassVar[tuple[str, ...]] = ()
+    weighs: ClassVar[bool] = False
+    within: ClassVar[Mapping[str, tuple[str, str]]] = {}
     everywhere: ClassVar[bool] = False
     usual: ClassVar[int] = 99
     elastic: ClassVar[bool] = False
@@ -419,6 +426,17 @@ class Effect(ABC):
         """
         return {}
 
+    def possible(self, robot: FlexibleRobot) -> Mapping[str, tuple[float, float]]:
+        """What a motion of this robot may tell of it: no body that cannot exist.
+
+        Args:
+            robot: that it is at work in.
+
+        Returns:
+            parameter -> least and most, SI, where that is narrower than the parameter's bounds.
+        """
+        return {}
+
     # Where it may be at work -----------------------------------------------------------------
 
     @classmethod
@@ -448,7 +466,7 @@ class Effect(ABC):
         Args:
             evidence: what the records can show.
         """
-        return evidence.lacks(cls.takes)
+        return evidence.lacks("posed" if cls.weighs and evidence.motion else cls.takes)
 
     @classmethod
     def applies(cls, evidence: Evidence) -> list[str]:

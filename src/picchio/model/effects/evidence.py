@@ -27,6 +27,7 @@ LACKING = {
     "reshaped": "blows of a force that was measured have no other shape to turn into",
     "days": "the records are not of several known dates",
     "kelvin": "the records are not of several known temperatures",
+    "posed": "some joints have no angle, and nobody says where they stand: state it as `pose`",
     "motion": "in blows it looks like a simpler effect, which is looked for; motions show it",
 }
 """What an effect may take of the records (`Effect.takes`), and what is wrong without it."""
@@ -73,6 +74,7 @@ class Evidence:
         kelvin: over which their temperatures are spread; 0 where they are not known.
         driven: joints that move and whose drive's torque was recorded.
         wound: joints that move and that have encoders on both sides of the gear.
+        unposed: joints that move and whose load depends on where joints without an angle stand.
         swept: joints that turn through so much in one record that a torque over the angle shows.
     """
 
@@ -90,11 +92,17 @@ class Evidence:
     driven: tuple[str, ...] = ()
     wound: tuple[str, ...] = ()
     swept: tuple[str, ...] = ()
+    unposed: tuple[str, ...] = ()
 
     @property
     def programmed(self) -> bool:
         """Whether some record's blows are known only as programmed, and may have come otherwise."""
         return not self.recorded
+
+    @property
+    def posed(self) -> bool:
+        """Whether it is known where all joints stand that others' loads depend on."""
+        return not self.unposed
 
     def lacks(self, what: str) -> str:
         """Why these records cannot show an effect, one clause; empty where they can.

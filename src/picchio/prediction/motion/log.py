@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -28,6 +28,8 @@ class MotionLog:
         torque: joint -> (m,) N m or N.
         link: joint -> (m,) link side, of joints that have both encoders.
         reference: joint -> (m,) as commanded.
+        standing: joint without an angle -> rad or m where it is taken to stand.
+        unknown: those of them of which nobody says where they stand.
     """
 
     file: str
@@ -37,6 +39,8 @@ class MotionLog:
     torque: Mapping[str, FloatArray]
     link: Mapping[str, FloatArray]
     reference: Mapping[str, FloatArray]
+    standing: Mapping[str, float] = field(default_factory=dict)
+    unknown: tuple[str, ...] = ()
 
     @property
     def samples(self) -> int:
@@ -85,6 +89,7 @@ def read_log(robot: FlexibleRobot, record: Record) -> MotionLog:
         raise InputError("the record has no joint's position", file=record.source.path,
                          key=record.file,
                          choices=["position.<joint>", "motor_position.<joint>"])  # fmt: skip
+    standing = record.standing(robot)
     return MotionLog(
         file=record.file,
         rate=record.clock.rate,
@@ -93,6 +98,8 @@ def read_log(robot: FlexibleRobot, record: Record) -> MotionLog:
         torque={joint: torque for joint, torque in roles["torque"].items() if joint in angle},
         link={joint: link[joint] for joint in link if joint in motor},
         reference=roles["reference"],
+        standing={joint: at or 0.0 for joint, at in standing.items()},
+        unknown=tuple(joint for joint, at in standing.items() if at is None),
     )
 
 

@@ -307,7 +307,7 @@ def rigid_motion(robot: FlexibleRobot, log: MotionLog, band: Band) -> Motion:
     """The record's motion and the torques that its rigid bodies take, by Pinocchio.
 
     Angles and what follows from them are low-passed in `band`. Joints that were not recorded
-    stand at zero.
+    stand still.
 
     Args:
         robot: masses and geometry.
@@ -317,7 +317,9 @@ def rigid_motion(robot: FlexibleRobot, log: MotionLog, band: Band) -> Motion:
     q = {joint: band.low_pass(angle) for joint, angle in log.angle.items()}
     v = {joint: band.differentiate(x) for joint, x in q.items()}
     a = {joint: band.differentiate(x) for joint, x in v.items()}
-    poses, velocities, accelerations = (_stack(robot, x, log.samples) for x in (q, v, a))
+    poses, velocities, accelerations = (
+        _stack(robot, x, log.samples, rest) for x, rest in ((q, log.standing), (v, {}), (a, {}))
+    )
     torque = robot.rigid.inverse_dynamics(poses, velocities, accelerations)
     _balance(robot, poses, torque)
     index = {joint: i for i, joint in enumerate(robot.joint_names)}
@@ -326,6 +328,13 @@ def rigid_motion(robot: FlexibleRobot, log: MotionLog, band: Band) -> Motion:
     def loads(frame: str) -> dict[str, FloatArray]:
         found = body_loads(robot, frame, poses, velocities, accelerations)
         return {joint: found[:, index[joint]] for joint in q if np.any(found[:, index[joint]])}
+
+    @cache
+    def weight() -> dict[str, FloatArray]:
+        still = np.zeros_like(poses)
+        held = robot.rigid.inverse_dynamics(poses, still, still)
+        _balance(robot, poses, held)
+        return {joint: held[:, index[joint]] for joint in q if np.any(held[:, index[joint]])}
 
     stiffness = dict(zip(robot.flexible_names, robot.stiffness, strict=True))
     ratio = {joint.name: joint.gear_ratio for joint in robot.flexible_joints}
@@ -340,6 +349,7 @@ def rigid_motion(robot: FlexibleRobot, log: MotionLog, band: Band) -> Motion:
         gear_ratio={joint: abs(ratio.get(joint) or 1.0) for joint in q},
         tool=robot.tool_frame,
         loads=loads,
+        weight=weight,
         link=lambda link: np.asarray(unit_inertia(robot.tree, link, None).toDynamicParameters()),
     )
 
@@ -379,9 +389,15 @@ def body_loads(
     return np.einsum("mjk,jn->mnk", found @ turned, rigid._follow)
 
 
-def _stack(robot: FlexibleRobot, series: dict[str, FloatArray], samples: int) -> FloatArray:
-    zero = np.zeros(samples)
-    return np.column_stack([series.get(joint, zero) for joint in robot.joint_names])
+def _stack(
+    robot: FlexibleRobot, series: dict[str, FloatArray], samples: int, rest: Mapping[str, float]
+) -> FloatArray:
+    return np.column_stack(
+        [
+            series[j] if j in series else np.full(samples, rest.get(j, 0.0))
+            for j in robot.joint_names
+        ]
+    )
 
 
 def _balance(robot: FlexibleRobot, poses: FloatArray, torque: FloatArray) -> None:

@@ -290,6 +290,33 @@ class RigidModel:
         """The mass of all bodies that can move, kg."""
         return float(sum(body.mass for body in list(self._model.inertias)[1:]))
 
+    def body_of(self, link: str) -> Array:
+        """The ten numbers (10,), in a link's frame, of all that is fixed to the link.
+
+        Args:
+            link: its name.
+
+        Raises:
+            InputError: no such link.
+        """
+        place = self._model.frames[self.frame(link)]
+        body = self._model.inertias[place.parentJoint]
+        return np.asarray(place.placement.actInv(body).toDynamicParameters())
+
+    def length(self, link: str) -> float:
+        """From the first joint to a link's frame along all joints between, m.
+
+        Args:
+            link: its name.
+
+        Raises:
+            InputError: no such link.
+        """
+        model, place = self._model, self._model.frames[self.frame(link)]
+        joints = list(model.supports[place.parentJoint])[2:]
+        offsets = [place.placement, *(model.jointPlacements[j] for j in joints)]
+        return float(sum(np.linalg.norm(each.translation) for each in offsets))
+
 
 def unit_inertia(tree: UrdfTree, link: str, point: tuple[float, ...] | None) -> pin.Inertia:
     """The inertia, in a link's frame, of 1 kg at a point; of the link itself without a point.

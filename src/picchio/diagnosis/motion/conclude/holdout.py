@@ -49,15 +49,17 @@ def judge(
     """Gain on a system; held out is nothing where it is the one that was fitted to.
 
     Every channel's residual over its noise and the square root of its samples, all channels
-    together, relative to the signal so weighted.
+    together, each as long as its record is, relative to the signal so weighted.
     """
     sums = np.zeros(4)
     parts = (system.measured, residual_of(system, before), residual_of(system, after))
-    for s in system.segments:
-        if s.group in groups:
-            for i, values in enumerate(parts):
-                sums[i] += float(np.mean(values[s.rows] ** 2)) / noise[s.group] ** 2
-            sums[3] += 1.0
+    judged = [s for s in system.segments if s.group in groups]
+    seconds = [system.logs[s.record].samples / system.logs[s.record].rate for s in judged]
+    for s, length in zip(judged, seconds, strict=True):
+        part = length * len(judged) / sum(seconds)
+        for i, values in enumerate(parts):
+            sums[i] += part * float(np.mean(values[s.rows] ** 2)) / noise[s.group] ** 2
+        sums[3] += part
     signal = max(sums[0], 1e-300)
     return Gain(
         train_records=tuple(log.file for log in train.logs),
@@ -65,7 +67,7 @@ def judge(
         baseline_nrmse=float(np.sqrt(sums[1] / signal)),
         extended_nrmse=float(np.sqrt(sums[2] / signal)),
         noise_floor_nrmse=float(np.sqrt(sums[3] / signal)),
-        channels=int(sums[3]),
+        channels=len(judged),
     )
 
 
@@ -104,29 +106,32 @@ def channels(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
             found.setdefault(row["channel"], []).append(row)
     made = []
     for channel, parts in found.items():
-        before, after, noise = (
+        before, after, noise, signal = (
             math.sqrt(sum(row[key] ** 2 * row["samples"] for row in parts)
                       / sum(row["samples"] for row in parts))
-            for key in ("baseline", "extended", "noise")
+            for key in ("baseline", "extended", "noise", "measured")
         )  # fmt: skip
         made.append({
             "channel": channel, "before": before, "after": after, "noise": noise,
-            "verdict": channel_verdict(before, after, noise),
+            "verdict": channel_verdict(before, after, noise, signal),
         })  # fmt: skip
     return made
 
 
-def channel_verdict(before: float, after: float, noise: float) -> Verdict:
+def channel_verdict(before: float, after: float, noise: float, signal: float = math.inf) -> Verdict:
     """What is said of one channel, in the words of a whole diagnosis.
 
     Args:
         before: RMS that the nominal model leaves.
         after: what the extended model leaves.
         noise: what noise alone leaves.
+        signal: RMS measured: where as much is left, nothing is explained.
     """
     if before <= NOISE * noise:
         return "nothing-wrong"
     if after <= NOISE * noise:
         return "named"
+    if after >= signal:
+        return "unexplained"
     explained = (before**2 - after**2) / max(before**2 - noise**2, 1e-300)
     return "partial" if explained >= MOSTLY else "unexplained"

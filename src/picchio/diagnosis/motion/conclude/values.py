@@ -102,7 +102,13 @@ def mean_inertia(system: System) -> dict[str, float]:
     for predictor in system.predictors:
         angle = predictor.nominal.angle
         step = max(1, predictor.log.samples // _POSES)
-        zero = np.zeros(predictor.log.samples)
-        poses = np.column_stack([angle.get(joint, zero) for joint in robot.joint_names])[::step]
+        poses = np.column_stack(
+            [
+                angle[j]
+                if j in angle
+                else np.full(predictor.log.samples, predictor.log.standing.get(j, 0.0))
+                for j in robot.joint_names
+            ]
+        )[::step]
         total.append(np.mean([np.diag(robot.rigid.mass_matrix(q.copy())) for q in poses], axis=0))
     return dict(zip(robot.joint_names, np.mean(total, axis=0).tolist(), strict=True))

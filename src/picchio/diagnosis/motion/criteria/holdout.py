@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
@@ -21,7 +20,8 @@ from picchio.model.effects.effect import Effect
 from picchio.model.effects.registry import effect_class
 from picchio.model.motion import RIPPLE
 
-Powers = dict[tuple[str, str], tuple[float, float]]  # file and channel -> without, with
+# File and channel -> what is left without and with an effect, in power; rows.
+Powers = dict[tuple[str, str], tuple[float, float, int]]
 
 _TINY = 1e-300
 _LITTLE = 0.05
@@ -34,9 +34,10 @@ def validate(
     """The fit without causes that lose on records held out, and those causes.
 
     What tells another cause with more numbers gives way to that one unless it predicts better.
-    Where two or more records are held out, a cause has to gain on each. In any case one that is
-    everywhere or nowhere has to gain in each of its channels, and no cause stays that loses in a
-    channel that is predicted worse than without any cause.
+    Where two or more records are held out, a cause has to gain on each; a short one is heard as
+    far as it is long. In any case one that is everywhere or nowhere has to gain in each of its
+    channels, and no cause stays that loses in a channel that is predicted worse than without any
+    cause.
 
     Args:
         train: the equations fitted to.
@@ -45,14 +46,16 @@ def validate(
         before: the nominal model's state.
     """
     current, dropped = _coarser(train, held_out, current)
+
+    def fails(effect: Effect, found: Powers) -> bool:
+        by_record = len(held_out.logs) > 1 and _fails(found, effect.periodic)
+        by_channel = _gains(found, _channel).values() if effect.everywhere else ()
+        return by_record or min(by_channel, default=0.0) < 0.0
+
     while current.state.effects:
         powers = _powers(train, held_out, current)
-        gains = [_gains(each, lambda file, channel: file) for each in powers]
-        failing = [
-            i for i, (effect, found) in enumerate(zip(current.state.effects, gains, strict=True))
-            if (len(held_out.logs) > 1 and _fails(found, effect.periodic))
-            or (effect.everywhere and min(_gains(powers[i], _channel).values(), default=0.0) < 0.0)
-        ]  # fmt: skip
+        gains = [_gains(each, _file) for each in powers]
+        failing = [i for i, e in enumerate(current.state.effects) if fails(e, powers[i])]
         if not failing:
             break
         # Ripples hardly touch each other and go together; others one by one, first what is of least
@@ -60,7 +63,7 @@ def validate(
         gone = [i for i in failing if current.state.effects[i].periodic]
         others = [i for i in failing if i not in gone]
         if others:
-            gone.append(min(others, key=lambda i: sum(gains[i].values())))
+            gone.append(min(others, key=lambda i: _mean(powers[i])))
         state = current.state
         for i in sorted(gone, reverse=True):
             dropped.append((state.effects[i], gains[i]))
@@ -83,26 +86,15 @@ def _coarser(
 ) -> tuple[Fit, list[tuple[Effect, dict[str, float]]]]:
     """The fit with the simpler form of each effect whose finer one does not predict better."""
     dropped: list[tuple[Effect, dict[str, float]]] = []
-    scale = row_weights(held_out, {g: current.level.get(g, 1.0) for g in held_out.groups})
     for index, effect in enumerate(current.state.effects):
         kind = effect_class(effect.refines) if effect.refines else None
         if kind is None or not kind.shows(motion=True):
             continue
         shared = {p.name: effect.values[p.name] for p in kind.parameters}
-        effects = list(current.state.effects)
-        effects[index] = kind(effect.target, **shared)
-        other = fit(train, replace(current.state, effects=tuple(effects)))
-        powers: Powers = {}
-        left = [
-            (held_out.measured - held_out.predict(state.every, state.scales)) * scale
-            for state in (other.state, current.state)
-        ]
-        for s in held_out.segments:
-            without, beside = (float(each[s.rows] @ each[s.rows]) for each in left)
-            powers[held_out.logs[s.record].file, ".".join(s.group)] = without, beside
-        gains = _gains(powers, lambda file, channel: file)
-        if sum(gains.values()) <= 0.0:
-            dropped.append((effect, gains))
+        other = fit(train, current.state.replaced(index, kind(effect.target, **shared)))
+        powers = _compared(held_out, other.state, current)
+        if _mean(powers) <= 0.0:
+            dropped.append((effect, _gains(powers, _file)))
             current = other
     return current, dropped
 
@@ -122,8 +114,8 @@ def _withdrawn(
         if not own:
             # What acts in several joints loses in this one, and on the whole.
             own = [
-                i for i, found in enumerate(gains) if found.get(channel, 0.0) < 0.0
-                and sum(_gains(powers[i], lambda file, channel: file).values()) <= 0.0
+                i for i, found in enumerate(gains)
+                if found.get(channel, 0.0) < 0.0 and _mean(powers[i]) <= 0.0
             ]  # fmt: skip
         if own:
             worst = min(own, key=lambda i: gains[i].get(channel, 0.0))
@@ -148,12 +140,36 @@ def worse_off(system: System, before: State, after: State) -> list[Group]:
     return [g for g in system.groups if power[1][g] > _WORSE**2 * power[0][g]]
 
 
-def _fails(gains: dict[str, float], ripple: bool) -> bool:
-    """A cause must gain on every record; a narrow line may lose a little on one of them."""
-    if not gains:
+def _fails(powers: Powers, ripple: bool) -> bool:
+    """A cause must gain on every record; a narrow line may lose a little on one of them.
+
+    What a short record tells of the gain is little: it is pooled with what all say, by its part
+    of a mean record's length.
+    """
+    if not powers:
         return False
-    worst, mean = min(gains.values()), sum(gains.values()) / len(gains)
+    gains, rows, mean = _gains(powers, _file), _rows(powers), _mean(powers)
+    full = sum(rows.values()) / len(rows)
+    weight = {file: min(1.0, n / full) for file, n in rows.items()}
+    worst = min(weight[file] * x + (1.0 - weight[file]) * mean for file, x in gains.items())
     return mean <= 0.0 or worst <= (-_LITTLE if ripple else 0.0)
+
+
+def _rows(powers: Powers) -> dict[str, int]:
+    rows: dict[str, int] = {}
+    for (file, _), (*_, count) in powers.items():
+        rows[file] = rows.get(file, 0) + count
+    return rows
+
+
+def _mean(powers: Powers) -> float:
+    """The gain on a record, on the mean; each counts by its rows."""
+    gains, rows = _gains(powers, _file), _rows(powers)
+    return sum(rows[file] * x for file, x in gains.items()) / max(sum(rows.values()), 1)
+
+
+def _file(file: str, channel: str) -> str:
+    return file
 
 
 def _channel(file: str, channel: str) -> str:
@@ -163,7 +179,7 @@ def _channel(file: str, channel: str) -> str:
 def _gains(powers: Powers, key: Callable[[str, str], str]) -> dict[str, float]:
     """File or channel, as `key` has it -> part of the power that an effect takes away there."""
     sums: dict[str, list[float]] = {}
-    for place, (without, beside) in powers.items():
+    for place, (without, beside, _) in powers.items():
         total = sums.setdefault(key(*place), [0.0, 0.0])
         total[0] += without
         total[1] += beside
@@ -206,6 +222,20 @@ def _powers(train: System, held_out: System, current: Fit) -> list[Powers]:
             found[held_out.logs[s.record].file, ".".join(s.group)] = (
                 float(np.sum((without * scale[s.rows]) ** 2)),
                 float(np.sum((residual[s.rows] * scale[s.rows]) ** 2)),
+                s.samples.size,
             )
         powers.append(found)
     return powers
+
+
+def _compared(held_out: System, fewer: State, current: Fit) -> Powers:
+    """What a state and a fit leave of the records held out."""
+    scale = row_weights(held_out, {g: current.level.get(g, 1.0) for g in held_out.groups})
+    states = (fewer, current.state)
+    left = [held_out.measured - held_out.predict(x.every, x.scales) for x in states]
+    found: Powers = {}
+    for s in held_out.segments:
+        without, beside = (float(np.sum((x[s.rows] * scale[s.rows]) ** 2)) for x in left)
+        place = held_out.logs[s.record].file, ".".join(s.group)
+        found[place] = without, beside, s.samples.size
+    return found

@@ -19,7 +19,7 @@ from picchio.diagnosis.motion.fit.least_squares import (
     row_weights,
 )
 from picchio.diagnosis.motion.fit.orders import Spectrum, order_spectrum
-from picchio.diagnosis.motion.fit.state import Coordinate, effect_coordinates
+from picchio.diagnosis.motion.fit.state import Coordinate
 from picchio.diagnosis.motion.fit.stretches import (
     Stretch,
     Validated,
@@ -83,11 +83,12 @@ class Scorer:
     Args:
         system: the training equations.
         base: the fit that candidates are added to.
+        level: group -> RMS to weigh by; what the base leaves if None.
     """
 
-    def __init__(self, system: System, base: Fit) -> None:
+    def __init__(self, system: System, base: Fit, level: dict[Group, float] | None = None) -> None:
         self.system, self.base = system, base
-        self.weight = row_weights(system, base.level)
+        self.weight = row_weights(system, base.level if level is None else level)
         self.left = base.columns * self.weight[:, None]
         self.right = base.residual * self.weight
         self.prior = np.array([c.precision for c in base.coordinates])
@@ -210,6 +211,14 @@ class Scorer:
                         columns.shape[1] + searched, tuple(float(v) for v in values),
                         admissible, effect.everywhere)  # fmt: skip
 
+    def validated(self, groups: tuple[Group, ...]) -> Validated:
+        """What the base leaves of some groups' stretches, each told by the others."""
+        nothing, index = np.zeros((self.system.size, 0)), np.flatnonzero(self.free)
+        parts = [p for s in self.system.segments if s.group in groups for p in self._of(s)]
+        blocks = [part.block(index, nothing, self.right) for part in parts]
+        elsewhere = self._elsewhere(groups, index)
+        return cross_validate(blocks, elsewhere, self.prior[index], self.pull[index], index.size)
+
     def _beside(self, effect: Effect, groups: tuple[Group, ...]) -> list[FloatArray]:
         """Columns (rows,) of what does in each joint by itself what the effect does in several."""
         there = {e.label for e in self.base.state.every}
@@ -228,7 +237,7 @@ class Scorer:
 
     def _unit(self, effect: Effect) -> FloatArray | None:
         system, state = self.system, self.base.state.with_effect(effect)
-        coordinates = effect_coordinates(effect, len(state.every) - 1, system.logs[0].rate)
+        coordinates = state.numbers(system, len(state.every) - 1)
         predicted = system.measured - self.base.residual
         columns = jacobian(system, state, predicted, coordinates)[1]
         return columns[:, 0] if columns.size else None
@@ -356,6 +365,43 @@ def necessity(scorer: Scorer, index: int) -> Score | None:
     noise = scorer.noise_of(current.state.effects[index])
     return scorer.score(current.state.effects[index], columns, coordinates, values - part,
                         without=own, back=columns @ part, noise=noise)  # fmt: skip
+
+
+def borne_out(scorer: Scorer, index: int, fewer: Fit) -> Score | None:
+    """As `necessity`, by the fit without the effect: nothing is linearised over its absence.
+
+    None where the effect may not be claimed, or makes a channel worse by its many numbers.
+
+    Args:
+        scorer: of the fit with it.
+        index: of the effect.
+        fewer: all others, fitted to the end.
+    """
+    system, current = scorer.system, scorer.base
+    effect, (own, part) = current.state.effects[index], contribution(current, index)
+    touched = [s.group for s in system.segments if np.any(current.columns[s.rows][:, own])]
+    groups = tuple(dict.fromkeys(touched))
+    if not groups:
+        return None
+    noise = scorer.noise_of(effect)
+    correlation = {
+        g: current.correlation[g] if noise is None else noise / current.level[g] ** 2
+        for g in groups
+    }
+    # What a bound holds would have to be what cannot be.
+    admissible = all(scorer.free[i] or not p for i, p in zip(own, part, strict=True))
+    score = _compare(
+        Scorer(system, fewer, current.level).validated(groups),
+        scorer.validated(groups),
+        correlation,
+        correlation,
+        groups,
+        len(own),
+        (),
+        admissible,
+        effect.everywhere,
+    )
+    return score if passes(score, effect.periodic, there=True) and not score.spoils else None
 
 
 def contribution(current: Fit, index: int) -> tuple[list[int], FloatArray]:

@@ -58,6 +58,9 @@ class System:
         if cutoff is None:
             cutoff = choose_cutoff([(log.angle[j], log.rate) for log in logs for j in log.moving])
         self.robot, self.logs, self.cutoff = robot, list(logs), cutoff
+        # Joints without an angle, and those whose load depends on where they stand.
+        self.unknown = tuple(dict.fromkeys(j for log in self.logs for j in log.unknown))
+        self.unposed = tuple(robot.resting_on(self.unknown))
         self.predictors = [Predictor(robot, log, Band(cutoff, log.rate)) for log in logs]
         self.segments: list[Segment] = []
         first = 0

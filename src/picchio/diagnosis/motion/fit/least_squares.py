@@ -58,8 +58,8 @@ def fit(system: System, state: State, *, rounds: int = _ROUNDS) -> Fit:
         state: where to start.
         rounds: of Gauss-Newton, at most; linear problems need one.
     """
-    rate = system.logs[0].rate
     best: tuple[float, State] | None = None
+    state = state.within(system)
     for _ in range(rounds):
         predicted = system.predict(state.every, state.scales)
         residual = system.measured - predicted
@@ -70,13 +70,14 @@ def fit(system: System, state: State, *, rounds: int = _ROUNDS) -> Fit:
                 state = best[1]
             break
         best = (cost, state)
-        coordinates, columns = jacobian(system, state, predicted, state.coordinates(rate))
+        coordinates, columns = jacobian(system, state, predicted, state.coordinates(system))
         if not coordinates:
             break
         weight = row_weights(system, level)
         step = solve(columns * weight[:, None], residual * weight, coordinates)
         for c, change in zip(coordinates, step, strict=True):
             state = state.moved(c, float(np.clip(c.value + change, c.lower, c.upper)))
+        state = state.within(system)
     return finish(system, state)
 
 
@@ -84,8 +85,7 @@ def finish(system: System, state: State) -> Fit:
     """Residual, derivatives and standard deviations at a state."""
     predicted = system.predict(state.every, state.scales)
     residual = system.measured - predicted
-    rate = system.logs[0].rate
-    coordinates, columns = jacobian(system, state, predicted, state.coordinates(rate))
+    coordinates, columns = jacobian(system, state, predicted, state.coordinates(system))
     level = levels(system, residual)
     correlation = {group: correlation_length(system, residual, group) for group in system.groups}
     spread = {g: max(each, _TINY) * np.sqrt(correlation[g]) for g, each in level.items()}

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+import numpy as np
 from lxml import etree
 
 from picchio.diagnosis.motion.data.system import System
 from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.effects.registry import catalogue
-from picchio.model.motion import TORQUE
+from picchio.model.motion import ROTOR, TORQUE, Motion
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.urdf.xml import parse_urdf, read_urdf_bytes
 
@@ -79,11 +80,11 @@ class State:
         """Nuisances, then effects."""
         return self.nuisances + self.effects
 
-    def coordinates(self, rate: float) -> list[Coordinate]:
+    def coordinates(self, system: System) -> list[Coordinate]:
         """What may be varied.
 
         Args:
-            rate: samples a second, Hz.
+            system: the equations.
         """
         found = [
             Coordinate(-1, joint, value, 1.0 - 2.0 * self.tolerance, 1.0 + 2.0 * self.tolerance,
@@ -94,7 +95,7 @@ class State:
         for index, effect in enumerate(self.every):
             if index in self.held:
                 continue
-            for c in effect_coordinates(effect, index, rate):
+            for c in self.numbers(system, index):
                 if (effect.label, c.name) in told:
                     value, std = told[effect.label, c.name]
                     if c.name in effect.inverse:
@@ -102,6 +103,53 @@ class State:
                     c = replace(c, prior=std, centre=value)
                 found.append(c)
         return found
+
+    def numbers(self, system: System, index: int) -> list[Coordinate]:
+        """An effect's parameters as a fit varies them, within what can be.
+
+        Args:
+            system: the equations.
+            index: of the effect in `every`.
+        """
+        effect, rate = self.every[index], system.logs[0].rate
+        possible = dict(effect.possible(system.robot))
+        for name, (other, parameter) in effect.within.items():
+            size = sum(
+                e.values[parameter]
+                for e in self.every
+                if (e.name, e.target) == (other, effect.target)
+            )
+            possible[name] = (-size, size)
+        found = []
+        for p in effect.parameters:
+            value, lower, upper = effect.values[p.name], p.lower, p.upper
+            if p.whole or (p.name == "order" and value.is_integer()):
+                continue  # locked to the motor's turn: no measured order is whole to the last digit
+            if p.moving is not None:
+                lower = p.moving
+            if p.name in effect.inverse:
+                value, lower, upper = 1.0 / value, 1.0 / p.upper, 1.0 / p.lower
+                step = 0.1
+            else:
+                step = _step(p, value, rate)
+            least, most = possible.get(p.name, (lower, upper))
+            known = (p.spread, p.neutral if p.centre is None else p.centre) if p.spread else ()
+            found.append(
+                Coordinate(index, p.name, value, max(lower, least), min(upper, most), step, *known)
+            )
+        return found
+
+    def within(self, system: System) -> State:
+        """With every number brought within what can be, beside the others.
+
+        Args:
+            system: the equations.
+        """
+        state = self
+        for c in self.coordinates(system):
+            if not c.lower <= c.value <= c.upper:
+                state = state.moved(c, min(max(c.value, c.lower), c.upper))
+        return state
 
     def given(self) -> State:
         """What was found, as a robot to start from: friction is fitted anew, all else stays."""
@@ -147,8 +195,17 @@ class State:
         coarser = [(e.name, e.target) for e in self.effects]
         if (effect.refines, effect.target) not in coarser:
             return replace(self, effects=(*self.effects, effect))
-        place = coarser.index((effect.refines, effect.target))
-        return replace(self, effects=(*self.effects[:place], effect, *self.effects[place + 1 :]))
+        return self.replaced(coarser.index((effect.refines, effect.target)), effect)
+
+    def replaced(self, index: int, effect: Effect) -> State:
+        """With another effect in the place of one.
+
+        Args:
+            index: of the one among those of this state.
+            effect: the other.
+        """
+        effects = (*self.effects[:index], effect, *self.effects[index + 1 :])
+        return replace(self, effects=effects)
 
     def without(self, index: int) -> State:
         """Without the effect of this number.
@@ -163,25 +220,6 @@ class State:
         gone = self.effects[index].label
         priors = tuple(p for p in self.priors if p[0] != gone)
         return replace(self, effects=kept, priors=priors)
-
-
-def effect_coordinates(effect: Effect, index: int, rate: float) -> list[Coordinate]:
-    """An effect's parameters as a fit varies them."""
-    found = []
-    for p in effect.parameters:
-        value, lower, upper = effect.values[p.name], p.lower, p.upper
-        if p.whole or (p.name == "order" and value.is_integer()):
-            continue  # locked to the motor's turn: no measured order is whole to the last digit
-        if p.moving is not None:
-            lower = p.moving
-        if p.name in effect.inverse:
-            value, lower, upper = 1.0 / value, 1.0 / p.upper, 1.0 / p.lower
-            step = 0.1
-        else:
-            step = _step(p, value, rate)
-        known = (p.spread, p.neutral) if p.spread else (None, 0.0)
-        found.append(Coordinate(index, p.name, value, lower, upper, step, *known))
-    return found
 
 
 def with_coordinate(effect: Effect, name: str, value: float) -> Effect:
@@ -206,18 +244,41 @@ def baseline(system: System, tolerance: float) -> State:
 
     The rigid bodies' torque of each joint may be off by the tolerance of forces: masses are
     rounded, currents calibrated. Friction that the URDF states is there, but friction is never
-    known beforehand: it is fitted without prior.
+    known beforehand: it is fitted without prior. Where nobody says how joints without an angle
+    stand, the others may take as much more or less to turn as they do in the pose assumed, and no
+    factor says more.
 
     Args:
         system: the training equations.
         tolerance: relative standard deviation.
     """
+    robot = system.robot
     driven = [joint for kind, joint in system.groups if kind == TORQUE]
+    folded = [UnknownInertia(joint) for joint in driven if joint in system.unposed]
+    own = np.diag(robot.rigid.mass_matrix(np.zeros(len(robot.joint_names))))
+    size = dict(zip(robot.joint_names, own.tolist(), strict=True))
     return State(
-        nuisances=stated_friction(system.robot, driven),
-        scales=dict.fromkeys(driven, 1.0),
+        nuisances=(*stated_friction(robot, driven), *folded),
+        scales=dict.fromkeys([joint for joint in driven if joint not in system.unposed], 1.0),
         tolerance=tolerance,
+        priors=tuple((e.label, "inertia", 0.0, size[e.target]) for e in folded),
     )
+
+
+class UnknownInertia(Effect):
+    """What the arm beyond a joint takes to turn more than in the pose that is assumed."""
+
+    name = "unknown_inertia"
+    where = "motion"
+    target_kind = "joint"
+    parameters = (Parameter("inertia", "kg*m^2", lower=-1e5, upper=1e5, meaning="more"),)
+    linear = ("inertia",)
+    meaning = "joints without an angle stand in a pose that nobody wrote down"
+
+    def motion(self, motion: Motion) -> None:
+        """Add what it takes to accelerate it."""
+        torque = self.values["inertia"] * motion.acceleration[self.target]
+        motion.add(ROTOR, self.target, torque)
 
 
 def stated_friction(robot: FlexibleRobot, joints: list[str]) -> tuple[Effect, ...]:

@@ -11,7 +11,7 @@ from picchio.core.arrays import FloatArray
 from picchio.diagnosis.motion.data.system import System
 from picchio.diagnosis.motion.fit.least_squares import Fit, clean, jacobian
 from picchio.diagnosis.motion.fit.orders import find_orders
-from picchio.diagnosis.motion.fit.state import Coordinate, effect_coordinates, with_coordinate
+from picchio.diagnosis.motion.fit.state import Coordinate, with_coordinate
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.registry import catalogue, effect_class
@@ -74,6 +74,7 @@ def evidence_of(system: System) -> Evidence:
         motion=True,
         groups=tuple(sorted(groups)),
         driven=tuple(joint for kind, joint in system.groups if kind == TORQUE),
+        unposed=tuple(j for kind, j in system.groups if kind == TORQUE and j in system.unposed),
         wound=tuple(joint for kind, joint in system.groups if kind == WINDUP),
         swept=tuple(
             dict.fromkeys(
@@ -153,7 +154,7 @@ def _make(system: System, base: Fit, predicted: FloatArray, effect: Effect,
           searched: set[str], around: list[Around]) -> list[Candidate]:  # fmt: skip
     """Derivatives at nothing, by what is not searched for."""
     state = base.state.with_effect(effect)
-    coordinates = effect_coordinates(effect, state.every.index(effect), system.logs[0].rate)
+    coordinates = state.numbers(system, state.every.index(effect))
     if effect.inverse:
         # Nothing is an infinite stiffness; the column is what the nominal one does.
         changed = system.predict(state.every, state.scales, effect, predicted)

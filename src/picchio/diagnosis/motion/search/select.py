@@ -15,6 +15,7 @@ import numpy as np
 from picchio.diagnosis.motion.criteria.score import (
     Score,
     Scorer,
+    borne_out,
     contribution,
     indistinguishable,
     necessity,
@@ -289,19 +290,28 @@ def _take_over(system: System, base: Fit, state: State, candidate: Candidate) ->
 
 
 def eliminate(system: System, current: Fit) -> Fit:
-    """Take out what is no longer needed, what bends to anything by its many numbers first."""
-    while current.state.effects:
+    """Take out what is no longer needed, what bends to anything by its many numbers first.
+
+    A linearised score proposes; a removal stands if the fit without bears it out.
+    """
+    borne: set[int] = set()
+    while True:
         scorer = Scorer(system, current)
         tried = []
         for index, effect in enumerate(current.state.effects):
             score = necessity(scorer, index)
-            if score is None or not passes(score, effect.periodic, there=True):
+            enough = score is not None and passes(score, effect.periodic, there=True)
+            if index not in borne and not enough:
                 few = score is not None and score.numbers <= _MANY
                 tried.append((few, -np.inf if score is None else score.gain, index))
         if not tried:
             return current
-        current = fit(system, current.state.without(min(tried)[2]))
-    return current
+        index = min(tried)[2]
+        fewer = fit(system, current.state.without(index))
+        if borne_out(scorer, index, fewer) is None:
+            current, borne = fewer, set()
+        else:
+            borne.add(index)
 
 
 def describe(score: Score, candidate: Candidate) -> dict[str, Any]:

@@ -32,6 +32,8 @@ class MotionAxesCheck(Check):
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
+        # Joints whose load depends on where nobody knows others stand.
+        self._rests: set[str] = set()
         # (joint's number, torque's channel): what was seen and what all joints must show.
         self._torques: dict[tuple[int, str], list[Pair]] = defaultdict(list)
 
@@ -52,7 +54,27 @@ class MotionAxesCheck(Check):
                 rate = np.gradient(_smooth(position, window), window.step)
                 what = f"derivative of {joint}'s position"
                 yield from self._follows(scan, name, rate, what, zero=True)
-        self._keep_torques(window, joints, roles["torque"])
+        yield from self._standing(scan, list(joints))
+        self._keep_torques(scan, joints, roles["torque"])
+
+    def _standing(self, scan: RecordScan, moved: list[str]) -> Iterator[Finding]:
+        """Joints without an angle: where they stand, and whether a load depends on it."""
+        robot = self.context.robot
+        if robot is None:
+            return
+        self._rests = set()
+        unknown = [joint for joint, at in scan.record.standing(robot).items() if at is None]
+        if not unknown:
+            return
+        self._rests = set(robot.resting_on(unknown))
+        needed = [joint for joint in moved if joint in self._rests]
+        matters = f"; what {', '.join(needed)} must carry depends on it" if needed else ""
+        yield self.found(
+            "warning" if needed else "note",
+            f"has no angle of {', '.join(unknown)}: taken to stand at 0{matters}",
+            "say where they stand as `pose` of the record",
+            record=scan.file,
+        )
 
     def _follows(self, scan: RecordScan, name: str, leader: FloatArray, what: str,
                  zero: bool = False) -> Iterator[Finding]:  # fmt: skip
@@ -82,10 +104,10 @@ class MotionAxesCheck(Check):
                              channel=name, value=slope)  # fmt: skip
 
     def _keep_torques(
-        self, window: Window, joints: dict[str, FloatArray], torques: dict[str, str]
+        self, scan: RecordScan, joints: dict[str, FloatArray], torques: dict[str, str]
     ) -> None:
-        robot = self.context.robot
-        measured = [joint for joint in joints if joint in torques]
+        robot, window = self.context.robot, scan.window
+        measured = [joint for joint in joints if joint in torques and joint not in self._rests]
         if robot is None or not measured or any(j not in robot.joint_names for j in joints):
             return
         smooth = {joint: _smooth(values, window) for joint, values in joints.items()}
@@ -98,6 +120,8 @@ class MotionAxesCheck(Check):
         index = np.linspace(edge, m - edge - 1, min(_SAMPLES, m - 2 * edge)).astype(int)
         size = len(robot.joint_names)
         pose, fast = np.zeros((index.size, size)), np.zeros((index.size, size))
+        for joint, stands in scan.record.standing(robot).items():
+            pose[:, robot.joint_names.index(joint)] = stands or 0.0
         for joint in joints:
             at = robot.joint_names.index(joint)
             pose[:, at], fast[:, at] = smooth[joint][index], acceleration[joint][index]

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import ClassVar
+
 import numpy as np
 
 from picchio.model.effects.effect import Effect, Parameter
@@ -23,6 +26,7 @@ class AsymmetricFriction(Effect):
     linear = ("torque", "coefficient")
     meaning = "gear and seals resist more in one direction than in the other"
     needs = "coulomb_friction"  # it says how dry friction varies
+    within: ClassVar[Mapping[str, tuple[str, str]]] = {"torque": ("coulomb_friction", "torque")}
     usual = 4
     source = "Janot, Gautier, Brunot, EMPS benchmark, 2019"
 

@@ -9,6 +9,7 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.motion import ROTOR, TORQUE, Motion
+from picchio.robot.flexible_robot import FlexibleRobot
 
 
 class CoupledDrive(Effect):
@@ -55,3 +56,7 @@ class CoupledDrive(Effect):
     def motion_trials(self, motion: Motion) -> list[dict[str, float]]:
         """Both ways round."""
         return [{"ratio": 1.0}, {"ratio": -1.0}]
+
+    def possible(self, robot: FlexibleRobot) -> dict[str, tuple[float, float]]:
+        """No more than the whole arm has, stretched out."""
+        return {"inertia": (0.0, robot.largest_inertia(self.target))}

@@ -20,6 +20,7 @@ class LoadFriction(Effect):
     linear = ("coefficient",)
     meaning = "teeth and bearings rub more under load: the gear's efficiency"
     needs = "coulomb_friction"  # it says how dry friction varies
+    weighs = True
     usual = 5
     source = "Hamon, Gautier, Garrec, IROS 2010"
 

@@ -17,6 +17,7 @@ class TorqueGain(Effect):
     )
     meaning = "the constant from current to torque is wrong"
     told_by = "once with a known mass at the tool and once without"
+    weighs = True
     usual = 9
 
     def motion(self, motion: Motion) -> None:

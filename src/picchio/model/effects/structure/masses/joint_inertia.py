@@ -6,6 +6,7 @@ from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.effects.scales import Scales
 from picchio.model.motion import ROTOR, Motion
 from picchio.model.plant import Changes
+from picchio.robot.flexible_robot import FlexibleRobot
 
 
 class JointInertia(Effect):
@@ -50,3 +51,7 @@ class JointInertia(Effect):
         """
         torque = self.values["inertia"] * motion.acceleration[self.target]
         motion.add(ROTOR, self.target, torque)
+
+    def possible(self, robot: FlexibleRobot) -> dict[str, tuple[float, float]]:
+        """No more than the whole arm has, stretched out, at a joint that turns."""
+        return {"inertia": (0.0, robot.largest_inertia(self.target))}

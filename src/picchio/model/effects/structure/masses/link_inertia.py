@@ -42,6 +42,7 @@ class LinkInertia(Effect):
     )
     meaning = "the link's mass, centre of mass and inertia are not the URDF's"
     mark = "link mass"
+    weighs = True
     usual = 8
     told_by = "at speeds and poses at which every joint above the link turns it about"
     refines = "link_mass"

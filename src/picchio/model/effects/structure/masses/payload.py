@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.effects.scales import Scales
+from picchio.model.inertia import removable
 from picchio.model.motion import Motion
 from picchio.model.plant import Changes
+from picchio.robot.flexible_robot import FlexibleRobot
 
 
 class Payload(Effect):
@@ -20,6 +24,7 @@ class Payload(Effect):
     meaning = "the tool is heavier (or lighter) than stated"
     sidecar = "mass"
     told_by = "once with a known mass at the tool and once without"
+    weighs = True
     usual = 1
     mark = "added mass"
 
@@ -35,3 +40,8 @@ class Payload(Effect):
         """Add its weight and inertia to every joint's torque."""
         if self.values["mass"] != 0.0:
             motion.add_body(motion.tool, self.values["mass"] * np.eye(10)[0])
+
+    def possible(self, robot: FlexibleRobot) -> dict[str, tuple[float, float]]:
+        """No more than can be taken off what carries the tool frame."""
+        own = robot.rigid.body_of(robot.tool_frame)
+        return {"mass": (-removable(own, np.eye(10)[0]), math.inf)}

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 from picchio.core.arrays import FloatArray
 from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.effects.scales import Scales
-from picchio.model.inertia import body
+from picchio.model.inertia import body, removable
 from picchio.model.motion import Motion
 from picchio.model.plant import Changes
+from picchio.robot.flexible_robot import FlexibleRobot
 
 
 class PayloadBody(Effect):
@@ -28,6 +31,7 @@ class PayloadBody(Effect):
     )  # fmt: skip
     meaning = "what the tool carries has its centre of mass away from the tool frame"
     told_by = "once with a known mass at the tool and once without"
+    weighs = True
     usual = 1
     mark = "added mass"
     refines = "payload"
@@ -35,8 +39,11 @@ class PayloadBody(Effect):
     takes = "motion"
 
     def _ten(self) -> FloatArray:
-        values = self.values
-        return body(values["mass"], [values[a] for a in "xyz"], [values[2 * a] for a in "xyz"])
+        return self.values["mass"] * self._unit()
+
+    def _unit(self) -> FloatArray:
+        """Its ten numbers for each kg."""
+        return body(1.0, *([self.values[n * a] for a in "xyz"] for n in (1, 2)))
 
     def structure(self, plant: Changes) -> None:
         """Add the body; the pose is given, so its weight loads the springs but bends nothing."""
@@ -50,3 +57,8 @@ class PayloadBody(Effect):
         """Add its weight and inertia to every joint's torque."""
         if self.values["mass"] != 0.0:
             motion.add_body(motion.tool, self._ten())
+
+    def possible(self, robot: FlexibleRobot) -> dict[str, tuple[float, float]]:
+        """No more than can be taken off what carries the tool frame."""
+        own = robot.rigid.body_of(robot.tool_frame)
+        return {"mass": (-removable(own, self._unit()), math.inf)}

@@ -28,6 +28,7 @@ class Counterbalance(Effect):
     )
     meaning = "a weight, a spring or a gas cylinder carries part of the load of the joint"
     mark = "spring"
+    weighs = True
     usual = 10
     takes = "motion"
     told_by = "slowly through the joint's whole range, once with a known mass at the tool"
