@@ -125,21 +125,6 @@ def stretched(ten: FloatArray, changes: Sequence[float]) -> FloatArray:
     return np.asarray(ten + ten_numbers(np.exp(mass) * made @ made.T - whole))
 
 
-def removable(ten: FloatArray, part: FloatArray) -> float:
-    """How many times a part can be taken off a body, so that what is left can exist.
-
-    Args:
-        ten: (10,) of the body.
-        part: (10,) of the part, in the same frame.
-    """
-    size, vectors = np.linalg.eigh(pseudo_inertia(ten))
-    if size[-1] <= 0.0:
-        return 0.0
-    # P - k Q stays positive definite up to k = 1 / the largest eigenvalue of P^-1/2 Q P^-1/2.
-    root = vectors / np.sqrt(np.maximum(size, _THIN * size[-1]))
-    return float(1.0 / np.linalg.eigvalsh(root.T @ pseudo_inertia(part) @ root)[-1])
-
-
 def point_masses(ten: FloatArray, reach: float) -> list[tuple[float, tuple[float, ...]]]:
     """Ten point masses, some of them negative, that are together what a body is.
 

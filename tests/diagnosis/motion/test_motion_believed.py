@@ -12,7 +12,6 @@ from picchio.diagnosis.motion.diagnosis import diagnose_motion
 from picchio.diagnosis.result import Gain
 from picchio.measurement.quality.report import check
 from picchio.model.effects.registry import effect_class
-from picchio.model.inertia import body, point, pseudo_inertia, removable
 from picchio.robot.loading.load import load_robot
 
 RUBS = 4.0
@@ -150,31 +149,14 @@ def test_friction_that_is_read_late_is_not_taken_out_again(tmp_path, rubs, late,
         assert abs(told["asymmetric_friction"]["torque"].value) <= most
 
 
-@pytest.mark.parametrize(
-    ("ten", "part", "most"),
-    [
-        # A ball of 3 kg and a point at its centre: all of it.
-        (body(3.0, [0, 0, 0], [0.01] * 3), point(1.0, [0, 0, 0]), 3.0),
-        # The same point at its surface, sqrt(5) of its mean extent away: a sixth.
-        (body(3.0, [0, 0, 0], [0.01] * 3), point(1.0, [5**0.5 * 0.1, 0, 0]), 0.5),
-        # Half of a rod from the whole.
-        (body(2.0, [0.1, 0, 0], [0.04, 1e-3, 1e-3]), body(1.0, [0.1, 0, 0], [0.04, 1e-3, 1e-3]), 2),
-        (np.zeros(10), point(1.0, [0, 0, 0]), 0.0),
-    ],
-)
-def test_what_can_be_taken_off_a_body(ten, part, most):
-    assert removable(ten, part) == pytest.approx(most, rel=1e-6)
-    if most:
-        assert np.linalg.eigvalsh(pseudo_inertia(ten - 0.999 * most * part))[0] > 0.0
-        assert np.linalg.eigvalsh(pseudo_inertia(ten - 1.001 * most * part))[0] < 0.0
-
-
 @pytest.mark.parametrize("arm", ["panda", "ur10", ARM])
 def test_no_number_is_free_to_be_what_no_robot_has(arm):
     robot = load_robot(arm, allow_rigid=True)
-    own = robot.rigid.body_of(robot.tool_frame)[0]
-    least = effect_class("payload")("tool").possible(robot)["mass"][0]
-    assert -own <= least <= 0.0
+    model = pin.buildModelFromUrdf(str(robot.source))
+    carries = model.frames[model.getFrameId(robot.tool_frame)].parentJoint
+    for name in ("payload", "payload_body"):
+        least = effect_class(name)("tool").possible(robot)["mass"][0]
+        assert least == pytest.approx(-model.inertias[carries].mass)
     joint = robot.joint_names[0]
     most = effect_class("joint_inertia")(joint).possible(robot)["inertia"][1]
     poses = np.random.default_rng(0).uniform(-3.0, 3.0, (50, len(robot.joint_names)))

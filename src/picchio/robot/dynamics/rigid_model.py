@@ -290,8 +290,8 @@ class RigidModel:
         """The mass of all bodies that can move, kg."""
         return float(sum(body.mass for body in list(self._model.inertias)[1:]))
 
-    def body_of(self, link: str) -> Array:
-        """The ten numbers (10,), in a link's frame, of all that is fixed to the link.
+    def mass_of(self, link: str) -> float:
+        """The mass of all that is fixed to a link, kg.
 
         Args:
             link: its name.
@@ -300,8 +300,7 @@ class RigidModel:
             InputError: no such link.
         """
         place = self._model.frames[self.frame(link)]
-        body = self._model.inertias[place.parentJoint]
-        return np.asarray(place.placement.actInv(body).toDynamicParameters())
+        return float(self._model.inertias[place.parentJoint].mass)
 
     def length(self, link: str) -> float:
         """From the first joint to a link's frame along all joints between, m.

@@ -8,7 +8,6 @@ import numpy as np
 
 from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.effects.scales import Scales
-from picchio.model.inertia import removable
 from picchio.model.motion import Motion
 from picchio.model.plant import Changes
 from picchio.robot.flexible_robot import FlexibleRobot
@@ -42,6 +41,5 @@ class Payload(Effect):
             motion.add_body(motion.tool, self.values["mass"] * np.eye(10)[0])
 
     def possible(self, robot: FlexibleRobot) -> dict[str, tuple[float, float]]:
-        """No more than can be taken off what carries the tool frame."""
-        own = robot.rigid.body_of(robot.tool_frame)
-        return {"mass": (-removable(own, np.eye(10)[0]), math.inf)}
+        """No more is taken off than what carries the tool frame weighs."""
+        return {"mass": (-robot.rigid.mass_of(robot.tool_frame), math.inf)}

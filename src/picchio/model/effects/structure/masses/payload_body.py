@@ -7,7 +7,7 @@ import math
 from picchio.core.arrays import FloatArray
 from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.effects.scales import Scales
-from picchio.model.inertia import body, removable
+from picchio.model.inertia import body
 from picchio.model.motion import Motion
 from picchio.model.plant import Changes
 from picchio.robot.flexible_robot import FlexibleRobot
@@ -39,11 +39,8 @@ class PayloadBody(Effect):
     takes = "motion"
 
     def _ten(self) -> FloatArray:
-        return self.values["mass"] * self._unit()
-
-    def _unit(self) -> FloatArray:
-        """Its ten numbers for each kg."""
-        return body(1.0, *([self.values[n * a] for a in "xyz"] for n in (1, 2)))
+        values = self.values
+        return body(values["mass"], [values[a] for a in "xyz"], [values[2 * a] for a in "xyz"])
 
     def structure(self, plant: Changes) -> None:
         """Add the body; the pose is given, so its weight loads the springs but bends nothing."""
@@ -59,6 +56,5 @@ class PayloadBody(Effect):
             motion.add_body(motion.tool, self._ten())
 
     def possible(self, robot: FlexibleRobot) -> dict[str, tuple[float, float]]:
-        """No more than can be taken off what carries the tool frame."""
-        own = robot.rigid.body_of(robot.tool_frame)
-        return {"mass": (-removable(own, self._unit()), math.inf)}
+        """No more is taken off than what carries the tool frame weighs."""
+        return {"mass": (-robot.rigid.mass_of(robot.tool_frame), math.inf)}
