@@ -11,12 +11,17 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import matplotlib.pyplot as plt
 import numpy as np
+import pandas
 import pytest
+from matplotlib.axes import Axes
 
 import picchio
+from picchio.core.fitted import Fit
 from picchio.core.html import Page
 from picchio.core.results import Result, TableResult
+from picchio.core.shown import Shown, named_function
 from picchio.fatigue.sn.test_table import SNTests
 from picchio.studies.maps.places import joint_grid
 
@@ -135,7 +140,7 @@ def calls(folder: Path) -> dict[str, Any]:
         "annotate": lambda: picchio.annotate("fanuc_like_3dof"),
         "assess": lambda: picchio.assess(robot, task),
         "check": lambda: picchio.check(picchio.simulate(robot, folder / "plan.toml").campaign),
-        "compare": lambda: picchio.compare(*[picchio.assess(robot, task)] * 2),
+        "compare": lambda: picchio.compare(robot, robot.with_stiffness(joint_1=1e5)),
         "count": lambda: picchio.count(
             robot,
             folder / "stamped.csv",
@@ -184,6 +189,7 @@ def test_what_a_function_returns(name: str, tmp_path: Path) -> None:
     shown = found._repr_html_()
     assert shown.startswith("<") and "object at 0x" not in text + shown
     assert "\n" not in text and len(text) < 300
+    check_plot_show_and_frame(found)
     if isinstance(found, Page):
         page = found.save(tmp_path / "page.html").read_text()
         assert page.lower().startswith("<!doctype html>")
@@ -202,6 +208,45 @@ def test_what_a_function_returns(name: str, tmp_path: Path) -> None:
     if name == "workspace_map":
         assert found.to_xarray().sizes["point"] >= 1
         found.close()
+
+
+def check_plot_show_and_frame(found: Shown) -> None:
+    """Each of the three works, or says in words why there is none."""
+    for name, reason in found.LACKS.items():
+        with pytest.raises(picchio.InputError, match=re.escape(reason)):
+            getattr(found, name)()
+    if "plot" not in found.LACKS:
+        for what in (None, *found.PLOTS):
+            assert isinstance(found.plot(what), Axes)
+        plt.close("all")
+        with pytest.raises(picchio.InputError, match=next(iter(found.PLOTS))):
+            found.plot("no such plot")
+    if "to_frame" not in found.LACKS:
+        assert isinstance(found.to_frame(), pandas.DataFrame)
+    if "show" not in found.LACKS and not isinstance(found, Page):
+        seen = found._seen()
+        assert picchio.view(**seen).items if seen else found.show() is found
+
+
+def classes_of(kind: type) -> set[type]:
+    return {kind} | {each for child in kind.__subclasses__() for each in classes_of(child)}
+
+
+def test_whatever_is_shown_can_be_plotted_and_made_a_table_or_says_why_not() -> None:
+    modules()
+    every = classes_of(Shown) - {Shown, Result, TableResult, Page, Fit}
+    assert len(every) > 30
+    given = {"Assessment", "DirectionEnvelope", "UncertainLife", "AllowableLoads", "Placement",
+             "WorkspaceMap", "Count", "PlannedTests", "Simulation"}  # fmt: skip
+    for each in every:
+        if not each.__module__.startswith("picchio."):
+            continue
+        scene = each.show is not Shown.show or each._seen is not Shown._seen
+        has = {"plot": bool(each.PLOTS), "show": scene or each.__name__ in given,
+               "to_frame": each.to_frame is not Shown.to_frame}  # fmt: skip
+        assert {name for name, there in has.items() if not there} == set(each.LACKS), each
+        for address in each.PLOTS.values():
+            assert inspect.signature(named_function(address)).parameters["ax"].default is None
 
 
 def test_a_report_says_what_its_page_needs() -> None:

@@ -11,7 +11,7 @@ import pytest
 from lxml import html as lxml_html
 
 import picchio
-from picchio.core.html import MOST_ROWS, cell, sheet, unfolded
+from picchio.core.html import MOST_ROWS, cell, sheet
 from picchio.fatigue.sn.fit import fit_sn
 from picchio.fatigue.sn.test_table import SNTests
 from picchio.studies.envelopes import envelope as envelope_of
@@ -30,10 +30,10 @@ def tables(shown: object) -> list[list[list[str]]]:
 
 
 def seen(shown: object) -> str:
-    """What stands there before anything is unfolded."""
+    """What stands there once all is folded."""
     page = lxml_html.fromstring(f"<div>{shown._repr_html_()}</div>")
     for details in page.iter("details"):
-        assert "open" not in details.attrib and details[0].tag == "summary"
+        assert "open" in details.attrib and details[0].tag == "summary"
         for folded in details[1:]:
             details.remove(folded)
     return page.text_content()
@@ -131,7 +131,7 @@ def test_the_line_that_is_seen_holds_what_matters(arm: SimpleNamespace) -> None:
         assert len(line) < len(lxml_html.fromstring(shown._repr_html_()).text_content())
 
 
-def test_an_estimate_says_so_before_it_is_unfolded() -> None:
+def test_an_estimate_says_so_in_the_line_that_stays() -> None:
     robot = picchio.load_robot("kinova_gen3")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -175,5 +175,5 @@ def test_nothing_in_a_sheet_is_markup() -> None:
     for where in (".//strong", ".//tr/th", ".//tr/td", ".//thead//th", ".//tbody//td", ".//p"):
         assert page.xpath(where)[0].text_content() == bad
     assert page.xpath("./summary")[0].text_content() == f"{bad}: {bad}"
-    assert unfolded(sheet(bad, note=bad)).count("<details open>") == 1
+    assert sheet(bad, note=bad).count("<details open>") == 1
     assert sheet("x", head="<y>") == "<div><strong>x</strong>: &lt;y&gt;</div>"

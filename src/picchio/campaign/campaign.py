@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path, PurePosixPath
-from typing import Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from picchio.campaign.channels import parse_channel
 from picchio.campaign.clock import TOLERANCE
@@ -30,14 +30,18 @@ from picchio.campaign.uff import ORDINATE, frf_source
 from picchio.core.errors import InputError, warn_user
 from picchio.core.files import part_of, recover, relative_name, swap_in, writing
 from picchio.core.guard import guard
+from picchio.core.shown import Shown
 from picchio.core.toml import parse_toml, validate
 from picchio.core.unfinished import unfinished
+
+if TYPE_CHECKING:
+    import pandas
 
 MAPPING_FILE = "mapping.toml"
 
 
 @dataclass(frozen=True, eq=False)
-class Campaign:
+class Campaign(Shown):
     """Records of one robot.
 
     Attributes:
@@ -45,6 +49,9 @@ class Campaign:
         records: in its order.
         folder: None for a campaign in memory.
     """
+
+    PLOTS: ClassVar = {"record": "visuals.plots.results:plot_first_record"}
+    LACKS: ClassVar = {"show": "records alone have no robot"}
 
     table: CampaignTable
     records: tuple[Record, ...]
@@ -127,6 +134,14 @@ class Campaign:
 
     def __repr__(self) -> str:
         return f"Campaign({len(self.records)} records, robot={self.table.robot!r})"
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A row a record: its kind, direction and channels."""
+        import pandas
+
+        rows = [(r.file, r.kind, r.direction, ", ".join(r.channels)) for r in self.records]
+        columns = ["record", "kind", "direction", "channels"]
+        return pandas.DataFrame(rows, columns=columns).set_index("record")
 
     def _repr_html_(self) -> str:
         from picchio.core.html import sheet

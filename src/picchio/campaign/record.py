@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -24,9 +24,13 @@ from picchio.campaign.source import Layout, MemorySource, Source
 from picchio.campaign.tables import FORMAT, CampaignExcitation, CampaignTable, RecordTable
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
+from picchio.core.shown import Shown
 from picchio.core.toml import validate
 from picchio.excitation.excitation import Excitation
 from picchio.robot.flexible_robot import FlexibleRobot
+
+if TYPE_CHECKING:
+    import pandas
 
 BLOCK = 16384
 LAYOUTS = {
@@ -37,7 +41,7 @@ LAYOUTS = {
 
 
 @dataclass(frozen=True, eq=False)
-class Record:
+class Record(Shown):
     """One record of a campaign.
 
     Attributes:
@@ -47,6 +51,9 @@ class Record:
         folder: the campaign's folder; None in memory.
         clock_tolerance: how uneven the clock may be, in steps.
     """
+
+    PLOTS: ClassVar = {"channels": "visuals.plots.results:plot_record"}
+    LACKS: ClassVar = {"show": "a record alone has no robot"}
 
     table: RecordTable
     source: Source
@@ -137,6 +144,12 @@ class Record:
         """
         found = [parse_channel(name, (units or {}).get(name))[0] for name in names]
         return cls(_table(file, table), MemorySource(found, read, file))
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A row a sample: the time (or the first column) and every channel, SI."""
+        import pandas
+
+        return pandas.DataFrame(self.read())
 
     def _repr_html_(self) -> str:
         from picchio.core.html import sheet

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import ctypes
 import hashlib
 import math
@@ -105,6 +106,13 @@ def writing(path: str | Path) -> Iterator[None]:
     except OSError as error:
         reason = error.strerror or str(error)
         raise OutputError(f"cannot be written: {reason}", file=path) from None
+
+
+def temporary_folder() -> Path:
+    """A new folder that lasts as long as this process."""
+    folder = tempfile.mkdtemp(prefix="picchio-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return Path(folder)
 
 
 def is_stream(path: str | Path) -> bool:

@@ -8,9 +8,10 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from picchio.core.shown import Shown
+
 MOST_ROWS = 30
 """More rows than this are cut off, and the table says how many."""
-FOLD = "<details>"
 
 
 def sheet(
@@ -21,7 +22,7 @@ def sheet(
     note: str = "",
     head: str = "",
 ) -> str:
-    """A line that is seen; facts a line each, a table, a note folded below; all text is escaped.
+    """A line; facts a line each, a table and a note below, open, to be folded; text is escaped.
 
     Args:
         title: what it is.
@@ -56,19 +57,7 @@ def sheet(
     if not parts:
         return f"<div>{line}</div>"
     body = f'<div style="overflow-x:auto">{"".join(parts)}</div>'
-    return f'{FOLD}<summary style="cursor:pointer">{line}</summary>{body}</details>'
-
-
-def unfolded(shown: str) -> str:
-    """Sheets as they stand in a page to print: open.
-
-    Args:
-        shown: HTML of `sheet`; text cannot hold what is changed, as it is escaped.
-
-    Returns:
-        the HTML.
-    """
-    return shown.replace(FOLD, "<details open>")
+    return f'<details open><summary style="cursor:pointer">{line}</summary>{body}</details>'
 
 
 def cell(value: Any) -> str:
@@ -91,7 +80,7 @@ def cell(value: Any) -> str:
     return escape("–" if value is None else str(value))
 
 
-class Page:
+class Page(Shown):
     """An HTML page that needs nothing but itself: shown in a notebook, or written to a file.
 
     Attributes:

@@ -9,6 +9,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from os import PathLike
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from picchio.core.shown import Shown
+
 if TYPE_CHECKING:
     import pandas
     import xarray
@@ -55,7 +57,7 @@ def json_pieces(value: Any) -> Iterator[str]:
     return encoder.iterencode(value)
 
 
-class Result:
+class Result(Shown):
     """What the answers of all commands have in common.
 
     A subclass says what it holds in `_content` and what matters in `_headline`; where a notebook
@@ -103,10 +105,12 @@ class TableResult(Result):
 
     Attributes:
         INDEX: the column that names a row; "" where rows are counted.
+        BARS: columns that `picchio.visuals.plots.results.plot_columns` draws.
         UNITS: {column: unit}; columns without a unit are left out.
     """
 
     INDEX: ClassVar[str] = "name"
+    BARS: ClassVar[tuple[str, ...]] = ()
     UNITS: ClassVar[Mapping[str, str]] = {}
 
     def _rows(self) -> Iterable[Mapping[str, Any]]:

@@ -30,6 +30,7 @@ from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.loading.find import shipped_robot
 from picchio.robot.loading.load import load_robot
+from picchio.robot.loading.objects import RobotLike, named
 from picchio.robot.loading.saved_model import is_saved_model
 from picchio.studies.tasks import Task, load_task
 
@@ -42,7 +43,7 @@ _MAKES_UP = (
 
 @one_thread()
 def diagnose(
-    robot: str | Path | FlexibleRobot,
+    robot: RobotLike,
     campaign: str | Path | Campaign,
     *,
     task: str | Path | Task | None = None,
@@ -209,20 +210,21 @@ def _worst_first(causes: Sequence[Cause], life: Mapping[str, Any] | None) -> tup
 
 
 def _named(
-    robot: str | Path | FlexibleRobot,
+    robot: RobotLike,
     loaded: FlexibleRobot,
     flex: str | Path | None,
     tool: str | None,
 ) -> dict[str, Any]:
-    """How a model's file names the robot, its sidecar and its tool."""
+    """How a model's file names the robot, its sidecar, its tool, and values given in Python."""
     if not isinstance(robot, FlexibleRobot):
-        return {"robot": str(robot), "flex": flex, "tool": tool}
+        return {"robot": str(named(robot)), "flex": flex, "tool": tool}
+    changed = getattr(loaded.again, "keywords", {})
     saved = [file for file in loaded.files if is_saved_model(file)]
     shipped = shipped_robot(loaded.name)
     if saved:
-        return {"robot": str(saved[-1])}
+        return {"robot": str(saved[-1]), **changed}
     if shipped is not None and shipped.urdf == loaded.source:
-        return {"robot": loaded.name}
+        return {"robot": loaded.name, **changed}
     sidecars = [file for file in loaded.files if file.suffix == ".toml"]
     return {"robot": str(loaded.source), "flex": sidecars[0] if sidecars else None,
-            "tool": loaded.tool_frame}  # fmt: skip
+            "tool": loaded.tool_frame, **changed}  # fmt: skip

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, ClassVar
 
 from picchio.campaign.campaign import Campaign
 from picchio.core.arrays import FloatArray
+from picchio.core.fitted import Fit, FittedValue
 from picchio.core.results import TableResult
 from picchio.robot.flexible_robot import FlexibleRobot
 
@@ -123,7 +124,7 @@ class PoseLeft:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Identification(TableResult):
+class Identification(TableResult, Fit):
     """What `identify` found; its table is the joints.
 
     Attributes:
@@ -131,6 +132,9 @@ class Identification(TableResult):
         source: where the data are from, such as the campaign's name.
         joints: every flexible joint.
     """
+
+    BARS = ("stiffness_value",)
+    PLOTS: ClassVar = {"bars": "visuals.plots.results:plot_columns"}
 
     PAGE = "visuals.report.identification:identification_page"
     INDEX = "joint"
@@ -173,6 +177,24 @@ class Identification(TableResult):
     def _told(self) -> str:
         told = sum(joint.stiffness.told for joint in self.joints)
         return f"stiffness of {told} of {len(self.joints)} joints"
+
+    def _fitted(self) -> Iterator[FittedValue]:
+        for joint in self.joints:
+            units = self.robot.joints[joint.name].units
+            for key, unit in (("stiffness", units.of("N*m/rad")), ("damping_ratio", "1")):
+                one: Identified = getattr(joint, key)
+                std = (one.high - one.low) / (2.0 * _HALF)
+                yield FittedValue(
+                    f"{key}.{joint.name}",
+                    one.value,
+                    std,
+                    unit,
+                    0.0,
+                    note=one.why if not one.told else "",
+                )
+
+    def _seen(self) -> Mapping[str, Any]:
+        return {"robot": self.robot}
 
     def _rows(self) -> list[dict[str, Any]]:
         return [

@@ -32,6 +32,7 @@ from picchio.robot.annotations.sidecar import Sidecar, spreads_of
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.joint import Joint, is_drive
 from picchio.robot.loading.load import load_robot
+from picchio.robot.loading.objects import RobotLike
 from picchio.robot.spread import ESTIMATED
 
 # A spread below this share of the tolerance comes from the records, not from the tolerance.
@@ -226,7 +227,7 @@ def method_for(campaign: Campaign) -> Method:
 
 @one_thread()
 def identify(
-    robot: str | Path | FlexibleRobot,
+    robot: RobotLike,
     campaign: str | Path | Campaign,
     *,
     flex: str | Path | None = None,

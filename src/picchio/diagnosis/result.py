@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from picchio.core import spoken
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
-from picchio.core.results import Result
+from picchio.core.fitted import Fit, FittedValue
+from picchio.core.results import TableResult
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.registry import effect_class
 from picchio.model.model import Model
@@ -321,7 +322,7 @@ class Left:
 
 
 @dataclass(frozen=True, repr=False)
-class Diagnosis(Result):
+class Diagnosis(TableResult, Fit):
     """The answer.
 
     Attributes:
@@ -346,6 +347,9 @@ class Diagnosis(Result):
         extra: more keys of the JSON.
         details: anything else that the report shows; not part of the JSON contract.
     """
+
+    INDEX = "name"
+    PLOTS: ClassVar = {"candidates": "visuals.report.percussion_figures:plot_candidates"}
 
     PAGE = "visuals.report.diagnosis:diagnosis_page"
 
@@ -431,6 +435,30 @@ class Diagnosis(Result):
             "scores": self.scores,
             **self.extra,
         }
+
+    def _rows(self) -> list[dict[str, Any]]:
+        return [asdict(value) for value in self._fitted()]
+
+    def _seen(self) -> Mapping[str, Any]:
+        return {"robot": self.model.robot, "diagnosis": self} if self.model else {}
+
+    def _fitted(self) -> Iterator[FittedValue]:
+        for cause in self.causes:
+            for one in effect_class(cause.effect).parameters:
+                name = f"{cause.effect}.{cause.target}.{one.name}"
+                found = cause.parameters.get(one.name, Value(one.neutral, math.nan, one.unit))
+                yield FittedValue(
+                    name,
+                    found.value,
+                    found.std,
+                    found.unit,
+                    one.lower,
+                    one.upper,
+                    one.name in cause.parameters,
+                    f"confidence {cause.confidence:.3g}",
+                )
+        for name, value in self.nuisances.items():
+            yield FittedValue(name, value.value, value.std, value.unit, note="a tolerance")
 
     def _headline(self) -> str:
         named = dict.fromkeys(f"{c.effect.replace('_', ' ')} of {c.target}" for c in self.causes)

@@ -10,15 +10,19 @@ import dataclasses
 from abc import ABC, abstractmethod
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
 from picchio.core.errors import InputError
+from picchio.core.shown import Shown
 from picchio.excitation.piecewise import PiecewiseForce
 
+if TYPE_CHECKING:
+    import pandas
 
-class Excitation(ABC):
+
+class Excitation(Shown, ABC):
     """A blow that repeats, and the steady feed force beside it.
 
     A kind is a frozen dataclass. The values that a file gives become its arguments.
@@ -37,6 +41,12 @@ class Excitation(ABC):
         preload: N, steady feed force along the same direction; it is there before the first
             blow, so that it is a mean and no vibration.
     """
+
+    PLOTS: ClassVar = {
+        "force": "visuals.plots.force:plot_force_train",
+        "spectrum": "visuals.plots.force:plot_force_spectrum",
+    }
+    LACKS: ClassVar = {"show": "show the robot they strike"}
 
     kind: ClassVar[str]
     meaning: ClassVar[str]
@@ -62,6 +72,12 @@ class Excitation(ABC):
             InputError: a value out of range; its key is the table's.
         """
         return cls(**values)
+
+    def to_frame(self) -> pandas.DataFrame:
+        """What states the blows, SI."""
+        import pandas
+
+        return pandas.Series(self.to_dict(), name="value").to_frame()
 
     @abstractmethod
     def blow(self) -> PiecewiseForce:

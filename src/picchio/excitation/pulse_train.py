@@ -82,6 +82,10 @@ class PulseTrain(Train):
         return _half_sine(self)
 
 
+USUAL_BLOWS, USUAL_HITS = PulseTrain(force=300.0, period=0.040, width=0.004), 12
+"""The blows of a rivet where nobody said: Nie et al. (2016)."""
+
+
 class HalfSineTrain(Train):
     """Half-sine blows: F0 sin(pi t / T_d) for 0 <= t < T_d; attributes and errors as of `Train`.
 

@@ -20,6 +20,7 @@ from picchio.core.errors import InputError, warn_user
 from picchio.core.files import printable_name, regular_file, sha256
 from picchio.core.processes import one_thread
 from picchio.core.provenance import provenance
+from picchio.core.shown import seeing
 from picchio.core.unfinished import unfinished
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.ledger.blows import Blow, bursts, covered, uncovered
@@ -34,10 +35,10 @@ from picchio.ledger.watch.changes import Shown, find, readings_of
 from picchio.ledger.watch.drives import drives
 from picchio.ledger.watch.exchange import exchange, signature
 from picchio.ledger.watch.ringing import ring_downs, temperatures
-from picchio.model.model import Model
+from picchio.model.model import Model, ModelLike
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.loading.find import shipped_robot
-from picchio.studies.default_task import task_of
+from picchio.studies.default_task import TaskLike, task_of
 from picchio.studies.rivet.life_rules import curves_of
 from picchio.studies.tasks import Task
 
@@ -49,12 +50,12 @@ _COUNTED = 2  # how a shift is counted: where that changes, shifts are counted a
 
 @one_thread()
 def count(
-    robot: FlexibleRobot | Model,
+    robot: ModelLike,
     log: str | Path | Sequence[str | Path] | None,
     ledger: str | Path,
     *,
     mapping: str | Path | Mapping | None = None,
-    task: Task | str | Path | None = None,
+    task: TaskLike = None,
     sn_curve: str | SNCurve | None = None,
     samples: int = 256,
     seed: int = 0,
@@ -134,7 +135,7 @@ def count(
         drawn = worlds(unscaled(model), curves, sn_curve, counted, samples, seed)
     inputs = [*bare.files, *work.files, *([rules_file] if rules_file else [])]
     notes = (*names, *_notes(counted, rules, model), *_surprises(drawn, model))
-    return Count(
+    found = Count(
         model=model, ledger=Path(printable_name(str(ledger))), logs=logs,
         added=tuple(added), known=tuple(known), refused=tuple(refused), detected=detected,
         counted=counted, worlds=drawn,
@@ -143,6 +144,7 @@ def count(
         curves=curves, notes=notes, hours_per_day=hours_per_day,
         origin=provenance(inputs, seed=seed),
     )  # fmt: skip
+    return seeing(found, robot=model, task=work)
 
 
 def _surprises(drawn: Worlds | None, model: Model) -> list[str]:

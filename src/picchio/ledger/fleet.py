@@ -51,6 +51,10 @@ class Fleet(TableResult):
         failed: of the first robot whose ledger could not be written, if any.
     """
 
+    BARS = ("damage",)
+    PLOTS: ClassVar = {"bars": "visuals.plots.results:plot_columns"}
+    LACKS: ClassVar = {"show": "it is about several robots"}
+
     UNITS: ClassVar[dict[str, str]] = {"damage": "1", "blows_left_p50": "1"}
 
     robot: str

@@ -48,6 +48,11 @@ class Count(TableResult):
         hours_per_day: h, that the robot works, where that was stated.
     """
 
+    PLOTS: ClassVar = {
+        "life used": "visuals.report.count:plot_life_used",
+        "blows": "visuals.report.count:plot_blows",
+    }
+
     INDEX = "name"
     PAGE: ClassVar[str] = "visuals.report.count:count_page"
     UNITS: ClassVar[dict[str, str]] = {"damage": "1", "blows_left_p50": "1"}

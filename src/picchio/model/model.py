@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.core.recent import Recent
+from picchio.core.shown import Shown
 from picchio.excitation.excitation import Excitation
 from picchio.excitation.piecewise import PiecewiseForce
 from picchio.excitation.pulse_train import PulseTrain
@@ -20,21 +21,27 @@ from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, Where
 from picchio.model.effects.registry import from_dict
 from picchio.model.linear_system import LinearSystem, modal_damping_matrix
+from picchio.robot.loading.load import load_robot
+from picchio.robot.loading.objects import RobotLike
 
 if TYPE_CHECKING:
+    import pandas
+
     from picchio.model.geometry import Geometry
     from picchio.model.plant import Plant
     from picchio.model.sensing import Sensors
     from picchio.robot.dynamics.statics import RobotState
     from picchio.robot.flexible_robot import FlexibleRobot
 
+ModelLike: TypeAlias = "RobotLike | Model"
+"""What goes wherever a robot goes, or a model of one."""
 _STRUCTURAL = ("structure", "over-time", "nonlinear")
 # In which order effects are applied: what a later one reads, an earlier one has changed.
 _ORDER = ("structure", "over-time", "nonlinear", "blows", "sensor", "motion")
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
+class Model(Shown):
     """A robot as a vibrating system.
 
     Attributes:
@@ -49,6 +56,8 @@ class Model:
         geometries: where those of poses are kept, for what looks at the same poses once more.
     """
 
+    LACKS: ClassVar = {"plot": "plot its robot, or a result"}
+
     robot: FlexibleRobot
     gravity_stiffness: bool = False
     gravity_balanced: bool = False
@@ -60,6 +69,7 @@ class Model:
     )
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "robot", load_robot(self.robot))
         if self.robot.effect_tables and not self.own:
             try:
                 own = tuple(from_dict(table, self.robot) for table in self.robot.effect_tables)
@@ -71,20 +81,24 @@ class Model:
     @classmethod
     def of(
         cls,
-        robot: FlexibleRobot | Model,
+        robot: ModelLike,
         *,
         gravity_stiffness: bool | None = None,
         gravity_balanced: bool | None = None,
+        **loading: Any,
     ) -> Model:
         """The model itself, or that of a robot; a switch that is given overrides the model's.
 
         Args:
-            robot: a robot (with the effects it was saved with) or a model.
+            robot: a robot as `load_robot` takes it (with the effects it was saved with), or a
+                model, which is loaded already.
             gravity_stiffness: see the class; of a robot what its fit assumed, else off.
             gravity_balanced: likewise.
+            **loading: how `load_robot` loads it, such as `flex`.
         """
         if not isinstance(robot, Model):
-            model = cls(robot, robot.adds_gravity(gravity_stiffness, usual=False))
+            loaded = load_robot(robot, **loading)
+            model = cls(loaded, loaded.adds_gravity(gravity_stiffness, usual=False))
         else:
             model = robot
         if gravity_stiffness is not None:
@@ -100,6 +114,13 @@ class Model:
             effects: beside those the robot was saved with; they replace any added since.
         """
         return replace(self, effects=(*self.own, *effects))
+
+    def _seen(self) -> dict[str, Any]:
+        return {"robot": self}
+
+    def to_frame(self) -> pandas.DataFrame:
+        """Its robot's joints as a table."""
+        return self.robot.to_frame()
 
     def _repr_html_(self) -> str:
         from picchio.core.html import sheet

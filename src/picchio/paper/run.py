@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from picchio.core.errors import InputError
 from picchio.core.html import sheet
@@ -42,6 +42,11 @@ class Reproduction(TableResult):
         answer: what explains Table 2.
         origin: provenance.
     """
+
+    LACKS: ClassVar = {
+        "plot": "it has many: `.figures[name].plot()`",
+        "show": "it is about a paper's sentences",
+    }
 
     PAGE = "paper.page:reproduction_page"
 

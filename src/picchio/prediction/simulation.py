@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -16,7 +16,8 @@ from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.core.processes import one_thread
 from picchio.core.provenance import provenance
-from picchio.core.results import Result
+from picchio.core.results import TableResult
+from picchio.core.shown import seeing
 from picchio.model.effects.effect import Effect
 from picchio.model.model import Model
 from picchio.prediction.percussion import PercussionSetup, percussion_setups
@@ -24,10 +25,14 @@ from picchio.prediction.plan import Plan, read_plan
 from picchio.robot.dynamics.pose import warn_beyond_limits
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.loading.load import load_robot
+from picchio.robot.loading.objects import RobotLike, named
+
+if TYPE_CHECKING:
+    import pandas
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Simulation(Result):
+class Simulation(TableResult):
     """The campaign that a test plan would give.
 
     Attributes:
@@ -37,10 +42,17 @@ class Simulation(Result):
         origin: provenance.
     """
 
+    INDEX = "record"
+    PLOTS: ClassVar = {"record": "visuals.plots.results:plot_first_record"}
+
     campaign: Campaign
     plan: Plan
     robot: str
     origin: dict[str, Any]
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A row a record, as of its campaign."""
+        return self.campaign.to_frame()
 
     def _headline(self) -> str:
         blows = "steady state" if self.plan.burst is None else f"{self.plan.burst} blows from rest"
@@ -70,7 +82,7 @@ class Simulation(Result):
 
 @one_thread()
 def simulate(
-    robot: str | Path | FlexibleRobot,
+    robot: RobotLike,
     plan: str | Path | Plan,
     to: str | Path | None = None,
     *,
@@ -87,7 +99,7 @@ def simulate(
     """Simulate a test before doing it: which sensors, poses, directions, levels.
 
     Args:
-        robot: the robot, or its name or file.
+        robot: as `load_robot` takes it.
         plan: poses, directions, levels, blows, sample rate, and sensors with their noise
             (`picchio-plan/1`); effects in it make the world differ from the model.
         to: the campaign's folder; None: the campaign stays in memory.
@@ -125,7 +137,7 @@ def simulate(
             _drawn(asked, every, names)
         )
         table: dict[str, Any] = {
-            "robot": robot_name or (loaded.name if robot is loaded else str(robot)),
+            "robot": robot_name or (loaded.name if robot is loaded else str(named(robot))),
             "tool": loaded.tool_frame,
             "excitation": _excitation(asked),
             "tolerance": asked.tolerance.model_dump(),
@@ -139,7 +151,8 @@ def simulate(
         raise error.placed(file=file) from None
     if to is not None:
         made = made.save(to, overwrite=overwrite)
-    return Simulation(made, asked, loaded.name, provenance(files, seed=asked.seed))
+    found = Simulation(made, asked, loaded.name, provenance(files, seed=asked.seed))
+    return seeing(found, robot=loaded, pose=loaded.pose(asked.poses[0]))  # type: ignore[arg-type]
 
 
 def _refuse_unread(effects: Sequence[Effect], plan: Plan, robot: FlexibleRobot) -> None:

@@ -6,7 +6,7 @@ import inspect
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from picchio.core.html import sheet
 from picchio.core.results import TableResult, plain
@@ -114,6 +114,8 @@ class EffectList(TableResult):
     Attributes:
         effects: by name.
     """
+
+    LACKS: ClassVar = {"plot": "it is a list to read", "show": "it is a list to read"}
 
     effects: tuple[EffectDescription, ...]
 

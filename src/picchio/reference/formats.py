@@ -16,7 +16,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from functools import cache
 from importlib.resources import files
-from typing import Any
+from typing import Any, ClassVar
 
 from pydantic import BaseModel
 
@@ -97,6 +97,8 @@ class FormatList(TableResult):
     Attributes:
         formats: inputs first.
     """
+
+    LACKS: ClassVar = {"plot": "it is a list to read", "show": "it is a list to read"}
 
     INDEX = ""
 

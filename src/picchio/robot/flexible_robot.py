@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from picchio.core.errors import InputError
+from picchio.core.results import TableResult
+from picchio.core.shown import Shown
 from picchio.robot.dynamics.pose import check_pose
 from picchio.robot.dynamics.rigid_model import RigidModel
 from picchio.robot.dynamics.statics import RobotState, balancing, stiffness_at_torque
@@ -23,6 +25,9 @@ from picchio.robot.tool import Gun, Mounting, Tool
 from picchio.robot.units import SLIDING
 from picchio.robot.urdf.tree import UrdfTree
 
+if TYPE_CHECKING:
+    import pandas
+
 Array = NDArray[np.float64]
 _MATTERS = 0.05  # of a weight or an inertia: less is within what models are off by
 _POSES = 20  # drawn to see whether one joint's weight depends on another
@@ -30,8 +35,68 @@ _TURN = 2.0  # rad or m: as far as those go
 _BEYOND = 1.0  # m beyond its tool frame, which what an arm holds may reach
 
 
+class Joints(TableResult, Mapping[str, Joint]):
+    """The movable joints of a robot by name, in its order, and as a table.
+
+    Args:
+        origins: where each value is from: "joint_1.stiffness" -> "flex.toml: Dumas 2011".
+        joints: by name.
+    """
+
+    LACKS: ClassVar = {"plot": "it is a list to read", "show": "show the robot"}
+
+    INDEX = "joint"
+    UNITS: ClassVar = {
+        "stiffness": "N m/rad, N/m",
+        "lower": "rad, m",
+        "upper": "rad, m",
+        "effort_limit": "N m, N",
+        "shaft_radius": "m",
+    }
+
+    def __init__(self, origins: Mapping[str, str], joints: Mapping[str, Joint]) -> None:
+        self._origins, self._joints = origins, joints
+
+    def __getitem__(self, name: str) -> Joint:
+        if name in self._joints:
+            return self._joints[name]
+        raise InputError("no such joint", key="joint", value=name, choices=self._joints)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._joints)
+
+    def __len__(self) -> int:
+        return len(self._joints)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._joints
+
+    def _headline(self) -> str:
+        guess = any(joint.estimated for joint in self.values())
+        return ", ".join(self) + ("; some stiffnesses are estimates" if guess else "")
+
+    def _content(self) -> Mapping[str, Any]:
+        return {"joints": list(self._rows())}
+
+    def _rows(self) -> Iterator[Mapping[str, Any]]:
+        for joint in self.values():
+            yield {
+                "joint": joint.name,
+                "kind": joint.kind,
+                "stiffness": joint.stiffness,
+                "damping_ratio": joint.damping_ratio,
+                "lower": joint.lower,
+                "upper": joint.upper,
+                "effort_limit": joint.effort_limit,
+                "shaft_radius": joint.shaft.radius if joint.shaft else np.nan,
+                "reducer": joint.reducer.name if joint.reducer else "",
+                "estimated": joint.estimated,
+                "stiffness_from": self._origins.get(f"{joint.name}.stiffness", ""),
+            }
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class FlexibleRobot:
+class FlexibleRobot(Shown):
     """A robot with flexible joints; immutable, picklable, safe to share between threads.
 
     Made by `load_robot`. Poses are (nv,): one number a movable joint, rad or m, in the order
@@ -58,7 +123,11 @@ class FlexibleRobot:
         findings: what is impossible or doubtful about its own numbers; among the warnings, too.
         spreads: how well values are known, by name such as "stiffness.joint_1".
         posterior: how these are correlated, or None.
+        again: makes it once more with other `values` and what it `carries`, as `load_robot` has
+            them; None of a robot that was changed since.
     """
+
+    PLOTS: ClassVar = {"robot": "visuals.scene.portrait:plot_standing"}
 
     name: str
     source: Path
@@ -79,6 +148,7 @@ class FlexibleRobot:
     findings: tuple[Finding, ...] = ()
     spreads: Mapping[str, Spread] = field(default_factory=dict)
     posterior: Posterior | None = None
+    again: Callable[..., FlexibleRobot] | None = None
     lower: Array = field(init=False)
     upper: Array = field(init=False)
     stiffness: Array = field(init=False)
@@ -108,24 +178,93 @@ class FlexibleRobot:
             f"flexible={list(self.flexible_names)}, tool_frame={self.tool_frame!r})"
         )
 
+    @property
+    def joints(self) -> Joints:
+        """Every movable joint by name: stiffness (infinite where rigid), limits, drive."""
+        known = {joint.name: joint for joint in self.flexible_joints}
+        own = self.tree.joints
+        return Joints(
+            self.origins,
+            {
+                name: known.get(name)
+                or Joint(
+                    name,
+                    "prismatic" if own[name].type == "prismatic" else "revolute",
+                    np.inf,
+                    np.nan,
+                    effort_limit=own[name].effort,
+                    lower=own[name].lower,
+                    upper=own[name].upper,
+                )
+                for name in self.joint_names
+            },
+        )
+
+    def _seen(self) -> Mapping[str, Any]:
+        return {"robot": self}
+
+    def to_frame(self) -> pandas.DataFrame:
+        """`joints` as a table."""
+        return self.joints.to_frame()
+
     def _repr_html_(self) -> str:
         from picchio.core.html import sheet
 
-        columns = ("joint", "kind", "stiffness [N m/rad, N/m]", "damping ratio", "shaft", "reducer")
-        rows = [
-            (j.name, j.kind, j.stiffness, j.damping_ratio,
-             f"radius {1e3 * j.shaft.radius:.4g} mm" if j.shaft else None,
-             j.reducer.name if j.reducer else None)
-            for j in self.flexible_joints
-        ]  # fmt: skip
-        guess = any(j.estimated for j in self.flexible_joints)
-        return sheet(
-            f"{self.name}: {len(self.joint_names)} joints, {len(rows)} flexible",
-            {"tool frame": self.tool_frame},
-            columns,
-            rows,
-            head="some stiffnesses are estimates; see .origins" if guess else "",
-        )
+        flexible = len(self.flexible_joints)
+        head = f"{len(self.joint_names)} joints, {flexible} flexible; tool frame {self.tool_frame}"
+        return sheet(self.name, head=head) + self.joints._repr_html_()
+
+    def with_stiffness(
+        self, stiffness: Mapping[str, float] | None = None, /, **joints: float
+    ) -> FlexibleRobot:
+        """The same robot with other stiffnesses, known exactly; everything else stays.
+
+        Args:
+            stiffness: N m/rad (N/m of a prismatic joint) by joint; for names that are no words of
+                Python.
+            **joints: likewise: `robot.with_stiffness(elbow_joint=1e4)`.
+
+        Raises:
+            InputError: no such joint, one that cannot be flexible, or a number that cannot be.
+        """
+        again = self._again()
+        new = {name: dict(table) for name, table in (again.keywords["values"] or {}).items()}
+        for name, value in {**(stiffness or {}), **joints}.items():
+            kept = {k: v for k, v in new.get(name, {}).items() if not k.startswith("stiffness")}
+            new[name] = {**kept, "stiffness": value}
+        return again(values=new)
+
+    def with_payload(
+        self,
+        mass: float,
+        *,
+        com: Sequence[float] = (0.0, 0.0, 0.0),
+        inertia: Sequence[float] = (0.0,) * 6,
+    ) -> FlexibleRobot:
+        """The same robot with something else at its tool frame; everything else stays.
+
+        It takes the place of the mass that the files give the tool; a gun's body stays.
+
+        Args:
+            mass: kg, of all that the frame carries.
+            com: (3,) m, centre of mass in the tool's frame.
+            inertia: (6,) kg m^2, about the centre of mass: ixx, ixy, ixz, iyy, iyz, izz.
+
+        Raises:
+            InputError: a number that cannot be.
+        """
+        carries = {"mass": mass, "com": list(com), "inertia": list(inertia)}
+        return self._again()(carries=carries)
+
+    def _again(self) -> Any:
+        if self.again is None:
+            raise InputError(
+                "was changed since it was loaded",
+                key="robot",
+                value=self.name,
+                hint="load it again",
+            )
+        return self.again
 
     @property
     def joint_names(self) -> tuple[str, ...]:

@@ -46,7 +46,7 @@ def robot_with(robot: FlexibleRobot, values: Iterable[tuple[Spread, Number]]) ->
             record = mounted[spread.table]
             mounted[spread.table] = _changed(record, spread.path, value, spread.component)
             moved = True
-    changes: dict[str, Any] = {"spreads": {}, "posterior": None}
+    changes: dict[str, Any] = {"spreads": {}, "posterior": None, "again": None}
     if moved:
         tool, gun, mounting = mounted["tool"], mounted["gun"], mounted["base"]
         tree = replace(robot.tree, links=links)

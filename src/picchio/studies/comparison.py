@@ -11,16 +11,18 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from picchio.core import spoken
 from picchio.core.errors import InputError
 from picchio.core.html import sheet
 from picchio.core.json_files import read_json
 from picchio.core.provenance import provenance
-from picchio.core.results import Result, plain
+from picchio.core.results import Result, TableResult, plain
 from picchio.core.toml import read_toml
+from picchio.model.model import Model, ModelLike
 from picchio.robot.loading.load import load_robot
+from picchio.robot.loading.objects import RobotLike
 from picchio.robot.units import units_of
 from picchio.studies.assessment.result import Assessment
 from picchio.studies.assessment.run import assess
@@ -116,7 +118,7 @@ class Difference:
 
 
 @dataclass(frozen=True, repr=False)
-class Comparison(Result):
+class Comparison(TableResult):
     """What differs.
 
     Attributes:
@@ -126,6 +128,12 @@ class Comparison(Result):
         notes: what could not be compared, a sentence each.
         provenance: versions and hashes.
     """
+
+    INDEX = "key"
+    LACKS: ClassVar = {
+        "plot": "its rows have different units",
+        "show": "it is about several robots",
+    }
 
     PAGE = "visuals.report.comparison:comparison_page"
 
@@ -177,6 +185,13 @@ class Comparison(Result):
         ratio = spoken.number(known[best] / known[least])
         return f"{told}; the margin of {best} is {ratio} times that of {least}"
 
+    def _rows(self) -> list[dict[str, Any]]:
+        names = [item.name for item in self.items]
+        return [
+            {"key": row.key, "unit": row.unit, **dict(zip(names, row.values, strict=True))}
+            for row in (*self.inputs, *self.results)
+        ]
+
     def _headline(self) -> str:
         names = ", ".join(item.name for item in self.items)
         return f"{names}: {len(self.inputs)} inputs and {len(self.results)} results differ"
@@ -196,9 +211,9 @@ class Comparison(Result):
 
 
 def compare(
-    *items: str | Path | Result | Mapping[str, Any],
+    *items: ModelLike | Result | Mapping[str, Any],
     task: str | Path | None = None,
-    robot: str | Path | None = None,
+    robot: RobotLike | None = None,
     flex: str | Path | None = None,
     tool: str | None = None,
     progress: Callable[[int, int], None] | None = None,
@@ -207,7 +222,7 @@ def compare(
 
     Args:
         *items: at least two: results of picchio or the JSON files of them, all of one format; or
-            names and files of robots, saved models, tasks and sidecars, which are assessed.
+            robots as `load_robot` takes them, and files of tasks and sidecars, which are assessed.
         task: for robots, models and sidecars; each robot's example task if not given, else
                 an assumed one.
         robot: for tasks and sidecars.
@@ -254,9 +269,9 @@ def compare(
 
 
 def _content_of(
-    item: str | Path | Result | Mapping[str, Any],
+    item: ModelLike | Result | Mapping[str, Any],
     task: str | Path | None,
-    robot: str | Path | None,
+    robot: RobotLike | None,
     flex: str | Path | None,
     tool: str | None,
 ) -> tuple[str, Mapping[str, Any]]:
@@ -265,6 +280,9 @@ def _content_of(
         item = item.to_dict()
     if isinstance(item, Mapping):
         return str(item.get("robot", item["format"])), _known(plain(item), None)
+    if not isinstance(item, (str, Path)):
+        model = Model.of(item)
+        return model.robot.name, assess(model, task).to_dict()
     path = Path(item)
     if path.suffix == ".json":
         return str(path), _known(read_json(path, "result", ["picchio-assessment/1"]), path)

@@ -8,8 +8,7 @@ from numpy.typing import ArrayLike
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.excitation.excitation import Excitation
-from picchio.model.model import Model
-from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.model.model import Model, ModelLike
 from picchio.studies.instant import use_at
 from picchio.studies.rivet.life_rules import curves_of
 from picchio.studies.rivet.pose import need_springs
@@ -40,7 +39,7 @@ class PoseCost:
 
     def __init__(
         self,
-        robot: FlexibleRobot | Model,
+        robot: ModelLike,
         direction: ArrayLike,
         excitation: Excitation,
         hits: int = 12,

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import pinocchio as pin
@@ -19,12 +19,13 @@ from numpy.typing import NDArray
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError, gathered
+from picchio.excitation.pulse_train import USUAL_HITS
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.ik.chain import Chain, tool_chain
 from picchio.studies.tasks import ASSUMED_BLOWS, FORMAT, Task, blows_of, load_task, task_from_dict
 
 POSES = 5
-HITS = 12  # 1, blows of a rivet
+TaskLike: TypeAlias = Task | str | Path | None
 LIFE = 1e6  # rivets, for which the allowable force is given where nobody asks for a life
 
 _DRAWN = 4000
@@ -71,7 +72,7 @@ def default_task(robot: FlexibleRobot, *, seed: int = 0) -> Task:
 
 def task_of(
     robot: FlexibleRobot,
-    task: Task | str | Path | None = None,
+    task: TaskLike = None,
     *,
     force: float | None = None,
     period: float | None = None,
@@ -128,7 +129,7 @@ def default_task_content(robot: FlexibleRobot, *, seed: int = 0) -> dict[str, An
     poses = [_written(robot, pose) for pose in default_poses(robot, seed=seed)]
     return {
         "format": FORMAT,
-        "hits_per_rivet": HITS,
+        "hits_per_rivet": USUAL_HITS,
         "excitation": ASSUMED_BLOWS.given(),
         "operation": [
             {"name": f"along {'xyz'[k]}", "direction": np.eye(3)[k].tolist(), "poses": poses}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,13 +15,15 @@ from picchio.core.html import sheet
 from picchio.core.processes import one_thread
 from picchio.core.provenance import provenance
 from picchio.core.results import TableResult
+from picchio.core.shown import seeing
 from picchio.excitation.excitation import Excitation
 from picchio.fatigue.shaft_stress import shaft_stress_per_torque
-from picchio.model.model import Model
-from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.model.model import Model, ModelLike
 from picchio.robot.units import JointUnits, column, units_of
 from picchio.robot.varied import cases_of
+from picchio.studies.default_task import task_of
 from picchio.studies.rivet.pose import ModelAtPose
+from picchio.studies.tasks import blows_of
 from picchio.vibration.closed_form.response import Response, described, peak_deflections
 
 FORMAT = "picchio-envelope/1"
@@ -61,6 +63,8 @@ class DirectionEnvelope(TableResult):
             drawn robots at times so near that a peak is missed by 1 %; else c is 0.
         case_stiffness: (c, n) N m/rad, of theirs.
     """
+
+    PLOTS: ClassVar = {"polar": "visuals.plots.polar:plot_polar_envelope"}
 
     robot: str
     joint_names: tuple[str, ...]
@@ -257,9 +261,9 @@ class DirectionEnvelope(TableResult):
 
 @one_thread()
 def envelope(
-    robot: FlexibleRobot | Model,
-    pose: ArrayLike,
-    excitation: Excitation,
+    robot: ModelLike,
+    pose: ArrayLike | Mapping[str, float] | str | None = None,
+    excitation: Excitation | None = None,
     *,
     hits: int | None = None,
     gravity_stiffness: bool | None = None,
@@ -267,9 +271,10 @@ def envelope(
     """The exact direction envelope of every joint at a pose.
 
     Args:
-        robot: with stiffnesses; or a model of it.
-        pose: (nv,) rad or m.
-        excitation: the blows.
+        robot: as `load_robot` takes it, with stiffnesses; or a model of it.
+        pose: (nv,) rad or m; the first of the robot's task if not given.
+        excitation: the blows; those of the robot's example task if not given, else 300 N, 4 ms
+            wide, one every 40 ms.
         hits: of a burst from rest with its ring-down; None for the steady state.
         gravity_stiffness: add dg/dq to the springs; as the model has it if not given.
 
@@ -282,6 +287,9 @@ def envelope(
             (whose worst direction has no closed form), an effect that has no steady state.
     """
     model = Model.of(robot, gravity_stiffness=gravity_stiffness)
+    if pose is None:
+        pose = task_of(model.robot).operations[0].poses[0]
+    excitation = excitation or blows_of(model.robot)
     at = ModelAtPose(model, model.robot.pose(pose))
     response = at.response(excitation, hits)
     worst = response.worst_directions()
@@ -289,7 +297,7 @@ def envelope(
         raise InputError("the deflections overflow", key="force", value=excitation.peak_force)
     tool, direction = at.tool_response(excitation, hits).worst_combination(np.eye(3))
     curves, stiffness = _cases(model, at.pose, excitation, hits)
-    return DirectionEnvelope(
+    found = DirectionEnvelope(
         robot=model.robot.name,
         joint_names=model.robot.flexible_names,
         kinds=tuple(joint.kind for joint in model.robot.flexible_joints),
@@ -310,6 +318,7 @@ def envelope(
         case_stiffness=stiffness,
         origin=provenance(model.robot.files),
     )
+    return seeing(found, robot=model, pose=at.pose, excitation=excitation, hits=hits)
 
 
 def _cases(

@@ -6,12 +6,12 @@ import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from picchio.core.errors import InputError
 from picchio.core.files import write_text
 from picchio.core.provenance import provenance
-from picchio.core.results import Result
+from picchio.core.results import TableResult
 from picchio.robot.annotations.inline import read_annotations
 from picchio.robot.annotations.sidecar import JointEntry, Sidecar, given, read_sidecar, spreads_of
 from picchio.robot.drives.reducer import Reducer
@@ -21,6 +21,7 @@ from picchio.robot.estimate.template import beside, comment, literal, sidecar_te
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.loading.find import FoundRobot, find_robot
 from picchio.robot.loading.load import load_robot
+from picchio.robot.loading.objects import RobotLike, named
 from picchio.robot.spread import ESTIMATE
 from picchio.robot.urdf.xml import parse_urdf, read_urdf_bytes
 from picchio.studies.default_task import default_task_content
@@ -41,7 +42,7 @@ picchio finds the poses."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Start(Result):
+class Start(TableResult):
     """A robot's estimated drives and a first task; `save` writes both as files to edit.
 
     Attributes:
@@ -58,6 +59,9 @@ class Start(Result):
         inputs: files that were read.
         files: where the two were saved, or empty.
     """
+
+    INDEX = "joint"
+    LACKS: ClassVar = {"plot": "it is two files to edit", "show": "it is two files: load them"}
 
     robot: str
     asked: str
@@ -157,6 +161,13 @@ class Start(Result):
         self.files[:] = [flex, task]
         return flex, task
 
+    def _rows(self) -> list[dict[str, Any]]:
+        keys = ("stiffness", "stiffness_spread", "damping_ratio", "damping_ratio_spread")
+        return [
+            {"joint": name, **{key: getattr(entry, key) for key in keys}}
+            for name, entry in self.sidecar.joint.items()
+        ]
+
     def _headline(self) -> str:
         return f"{self.robot}: {len(self.sidecar.joint)} drives estimated, a first task"
 
@@ -176,7 +187,7 @@ class Start(Result):
 
 
 def start(
-    robot: str | Path,
+    robot: RobotLike,
     *,
     tool: str | None = None,
     payload: float | None = None,
@@ -188,7 +199,7 @@ def start(
     """Estimate what nobody gave of a robot, and draw it a first task: two files to edit.
 
     Args:
-        robot: a name from `picchio.robots()`, or a path to a URDF.
+        robot: as `load_robot` takes it.
         tool: the frame on which the tool's force acts.
         payload: kg, rated; it makes the estimates more certain.
         reach: m, rated, where the URDF's is not right.
@@ -203,18 +214,19 @@ def start(
         InputError: the robot cannot be loaded, or no rotary joint moves its tool; an unknown class,
             joint or reducer; a number that is not positive.
     """
-    loaded = load_robot(robot, tool=tool, allow_rigid=True)
+    asked = named(robot)
+    loaded = load_robot(asked, tool=tool, allow_rigid=True)
     sidecar = estimated_sidecar(
         loaded, payload=payload, reach=reach, drive_class=drive_class, reducers=reducers
     )
-    found = find_robot(robot)
+    found = find_robot(asked)
     sidecar, known = _with_own(found, sidecar)
     rigid: dict[str, list[str]] = {}
     for out in left_rigid(loaded, sidecar.joint):
         rigid.setdefault(out.why, []).append(out.joint)
     return Start(
         robot=loaded.name,
-        asked=str(robot),
+        asked=str(asked),
         stem=(found.name or found.urdf.stem).replace("/", "_"),
         sidecar=sidecar,
         task=default_task_content(loaded, seed=seed),

@@ -6,23 +6,28 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from pydantic import Field
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError, warn_user
+from picchio.core.shown import Shown
 from picchio.core.toml import Finite, Positive, StrictModel, parse_toml, validate
 from picchio.excitation.excitation import Excitation
 from picchio.excitation.piecewise import Hits
+from picchio.excitation.pulse_train import USUAL_BLOWS, USUAL_HITS
 from picchio.excitation.table import ExcitationTable, excitation_class
+from picchio.model.model import Model, ModelLike
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.vibration.closed_form.response import unit_vector
 
+if TYPE_CHECKING:
+    import pandas
+
 FORMAT = "picchio-task/1"
-# Where nobody said: those of Nie et al. (2016); N, s, s.
-ASSUMED_BLOWS = ExcitationTable(kind="pulse_train", force=300.0, period=0.040, width=0.004)
+ASSUMED_BLOWS = ExcitationTable(**USUAL_BLOWS.to_dict())
 # An arm of fewer joints cannot choose where its tool points.
 _LEAST_JOINTS_TO_AIM = 5
 
@@ -69,7 +74,7 @@ class TaskTable(StrictModel):
         operation: rivets in one direction, one table for each.
     """
 
-    hits_per_rivet: Hits = 12
+    hits_per_rivet: Hits = USUAL_HITS
     excitation: ExcitationTable = ExcitationTable()
     operation: list[OperationTable] = Field(min_length=1)
 
@@ -96,7 +101,7 @@ class Operation:
 
 
 @dataclass(frozen=True, eq=False)
-class Task:
+class Task(Shown):
     """All that a robot does before it starts again.
 
     Attributes:
@@ -105,6 +110,8 @@ class Task:
         note: what it is, where nobody gave one; else "".
         assumed: nobody gave it: it is the robot's example, or drawn.
     """
+
+    LACKS: ClassVar = {"plot": "assess it", "show": "`picchio.view(robot, task=task)` shows it"}
 
     operations: tuple[Operation, ...]
     files: tuple[Path, ...] = ()
@@ -127,18 +134,36 @@ class Task:
         title = f"Task: {self.rivets_per_pass:g} rivets a pass"
         return sheet(title, None, columns, rows, head=self.note)
 
+    def to_frame(self) -> pandas.DataFrame:
+        """A row an operation."""
+        import pandas
+
+        return pandas.DataFrame(
+            [
+                {
+                    "operation": op.name,
+                    "direction": op.direction.tolist(),
+                    "poses": len(op.poses),
+                    "rivets": op.rivets,
+                    "hits_per_rivet": op.hits_per_rivet,
+                    "blows": op.excitation.describe(),
+                }
+                for op in self.operations
+            ]
+        ).set_index("operation")
+
     @property
     def rivets_per_pass(self) -> float:
         """Rivets set in one pass of the task."""
         return sum(op.rivets * len(op.poses) for op in self.operations)
 
 
-def load_task(path: str | Path, robot: FlexibleRobot) -> Task:
+def load_task(path: str | Path, robot: ModelLike) -> Task:
     """Read a `picchio-task/1` file for a robot; points become poses.
 
     Args:
         path: the file.
-        robot: that does the task.
+        robot: that does the task, as `load_robot` takes it.
 
     Returns:
         the task.
@@ -147,10 +172,10 @@ def load_task(path: str | Path, robot: FlexibleRobot) -> Task:
         InputError: anything wrong in the file, with its key; an unreachable point.
     """
     table = parse_toml(path, TaskTable, format=FORMAT)
-    return _build(table, robot, Path(path))
+    return _build(table, Model.of(robot).robot, Path(path))
 
 
-def task_from_dict(data: Mapping[str, Any], robot: FlexibleRobot) -> Task:
+def task_from_dict(data: Mapping[str, Any], robot: ModelLike) -> Task:
     """The task that a file with this content would give.
 
     Args:
@@ -161,7 +186,8 @@ def task_from_dict(data: Mapping[str, Any], robot: FlexibleRobot) -> Task:
         InputError: as `load_task`.
     """
     content = {"format": FORMAT, **data}
-    return _build(validate(content, TaskTable, format=FORMAT), robot, None)
+    table = validate(content, TaskTable, format=FORMAT)
+    return _build(table, Model.of(robot).robot, None)
 
 
 def _build(table: TaskTable, robot: FlexibleRobot, file: Path | None) -> Task:

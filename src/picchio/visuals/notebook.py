@@ -30,7 +30,7 @@ def progress(what: str = "") -> Iterator[Callable[[int, int], None]]:
     """
     handle: Any = None
     began = shown = time.monotonic()
-    inside = _in_notebook()
+    inside = in_notebook()
 
     def report(done: int, total: int) -> None:
         nonlocal handle, shown
@@ -64,7 +64,8 @@ def bar(done: int, total: int, what: str, elapsed: float) -> str:
     )
 
 
-def _in_notebook() -> bool:
+def in_notebook() -> bool:
+    """Whether a notebook's kernel runs this."""
     # IPython is asked only where it already runs: importing it takes half a second.
     ipython = sys.modules.get("IPython")
     shell = ipython.get_ipython() if ipython is not None else None

@@ -11,11 +11,10 @@ from numpy.typing import ArrayLike
 from picchio.core.errors import InputError
 from picchio.diagnosis.result import Diagnosis
 from picchio.excitation.excitation import Excitation
-from picchio.model.model import Model
-from picchio.robot.flexible_robot import FlexibleRobot
-from picchio.robot.loading.load import load_robot
+from picchio.model.model import Model, ModelLike
+from picchio.studies.assessment.result import Assessment
 from picchio.studies.assessment.run import assess
-from picchio.studies.default_task import task_of
+from picchio.studies.default_task import TaskLike, task_of
 from picchio.studies.maps.result import WorkspaceMap
 from picchio.studies.maps.stored import open_map
 from picchio.studies.tasks import Task, blows_of
@@ -29,9 +28,9 @@ if TYPE_CHECKING:
 
 
 def view(
-    robot: str | Path | FlexibleRobot | Model,
+    robot: ModelLike,
     *,
-    task: str | Path | Task | None = None,
+    task: TaskLike = None,
     pose: ArrayLike | Mapping[str, float] | None = None,
     excitation: Excitation | None = None,
     hits: int | None = None,
@@ -41,6 +40,7 @@ def view(
     flex: str | Path | None = None,
     tool: str | None = None,
     gravity_stiffness: bool | None = None,
+    assessment: Assessment | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Scene:
     """The robot in 3-D with its direction envelopes, rivets and vibration.
@@ -59,6 +59,7 @@ def view(
         flex: sidecar of the robot.
         tool: the frame that carries the tool.
         gravity_stiffness: add gravity's stiffness dg/dq to the springs'.
+        assessment: of the robot on this task, where there is one already.
         progress: called with (done, total) poses of the task.
 
     Returns:
@@ -67,8 +68,7 @@ def view(
     Raises:
         InputError: a file that cannot be read, a bad pose, an unknown joint.
     """
-    found = robot if isinstance(robot, Model) else load_robot(robot, flex=flex, tool=tool)
-    model = Model.of(found, gravity_stiffness=gravity_stiffness)
+    model = Model.of(robot, gravity_stiffness=gravity_stiffness, flex=flex, tool=tool)
     loaded = model.robot
     if diagnosis is not None and not isinstance(diagnosis, Diagnosis):
         diagnosis = read_diagnosis(diagnosis, loaded)
@@ -86,7 +86,7 @@ def view(
         if value is not None:
             raise InputError("needs --pose: a task says its blows itself", key=key, value=value)
     task = task_of(loaded, task)
-    life = assess(model, task, progress=progress)
+    life = assessment or assess(model, task, progress=progress)
     worst = worst_rivet(life, model, task)
     return build_scene(
         model,

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from numpy.typing import ArrayLike
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
+from picchio.core.shown import Shown
 from picchio.fatigue.counting.counter import rainflow
 from picchio.fatigue.counting.cycles import Cycles
 from picchio.fatigue.shaft_stress import shear_stress
-from picchio.model.model import Model
-from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.model.model import Model, ModelLike
 from picchio.robot.joint import Joint
 from picchio.studies.assessment.result import Assessment
 from picchio.studies.rivet.pose import Rivet, SampledResponse
@@ -18,9 +22,12 @@ from picchio.studies.tasks import Operation, Task
 from picchio.vibration.closed_form.modes import Modes
 from picchio.vibration.closed_form.response import Response
 
+if TYPE_CHECKING:
+    import pandas
+
 
 @dataclass(frozen=True, eq=False)
-class WorstRivet:
+class WorstRivet(Shown):
     """A joint's worst rivet.
 
     Attributes:
@@ -31,6 +38,8 @@ class WorstRivet:
         rest: response to the burst; None where its ring-down goes on.
         steady: steady state; None where there is none.
     """
+
+    PLOTS: ClassVar = {"stress": "visuals.plots.stress:plot_rivet_stress"}
 
     rivet: Rivet
     joint: Joint
@@ -78,10 +87,46 @@ class WorstRivet:
         Raises:
             InputError: the joint has no shaft.
         """
+        time, value = self.response.turning_points(self.operation.direction)[self.index]
+        return time, self.stress_of(self.stiffness * value)
+
+    def stress(self, time: ArrayLike) -> FloatArray:
+        """The shear stress (k,) Pa of the vibration.
+
+        Args:
+            time: (k,) s from the first blow.
+
+        Raises:
+            InputError: the joint has no shaft.
+        """
+        deflection = self.response.deflection(time, self.operation.direction)[self.index]
+        return self.stress_of(self.stiffness * deflection)
+
+    def stress_of(self, torque: Any) -> Any:
+        """The shear stress, Pa, that a torque brings into the shaft.
+
+        Args:
+            torque: N m, any shape.
+
+        Raises:
+            InputError: the joint has no shaft.
+        """
         if self.joint.shaft is None:
             raise InputError("the joint has no shaft", key=self.joint.name)
-        time, value = self.response.turning_points(self.operation.direction)[self.index]
-        return time, shear_stress(self.stiffness * value, self.joint.shaft)
+        return shear_stress(torque, self.joint.shaft)
+
+    def to_frame(self) -> pandas.DataFrame:
+        """The cycles, as `cycles`."""
+        return self.cycles().to_frame()
+
+    def _seen(self) -> Mapping[str, Any]:
+        op = self.operation
+        return {
+            "robot": self.rivet.model,
+            "pose": self.pose,
+            "excitation": op.excitation,
+            "hits": op.hits_per_rivet,
+        }
 
     def cycles(self) -> Cycles:
         """The cycles of the shear stress, Pa, counted with half cycles for the residue."""
@@ -90,7 +135,7 @@ class WorstRivet:
 
 def worst_rivet(
     assessment: Assessment,
-    robot: FlexibleRobot | Model,
+    robot: ModelLike,
     task: Task,
     *,
     gravity_stiffness: bool | None = None,

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import nullcontext
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -33,6 +33,9 @@ from picchio.core.provenance import provenance
 from picchio.core.results import Result
 from picchio.core.tables import TextLayout, read_table, table_blocks
 from picchio.core.toml import read_toml
+
+if TYPE_CHECKING:
+    import pandas
 
 _ROOM = "picchio.campaign.importing.readers"
 _ISOLATED = {
@@ -206,6 +209,8 @@ class Detection(Result):
         raw: the file.
         lines: a sentence each: layout, clock, rate, gaps.
     """
+
+    LACKS: ClassVar = dict.fromkeys(("plot", "show", "to_frame"), "no record was made yet")
 
     raw: RawFile
     lines: tuple[str, ...]
@@ -488,6 +493,9 @@ class ImportedRecord(Result):
         records_added: how many records the file became: its gaps divide it.
     """
 
+    PLOTS: ClassVar = {"record": "visuals.plots.results:plot_first_record"}
+    LACKS: ClassVar = {"show": "a record alone has no robot"}
+
     campaign: Campaign
     origin: dict[str, Any]
     detected: tuple[str, ...] = ()
@@ -497,6 +505,10 @@ class ImportedRecord(Result):
     def record(self) -> Record:
         """The record that was imported; of several, the first."""
         return self.campaign.records[-self.records_added]
+
+    def to_frame(self) -> pandas.DataFrame:
+        """The record, a row a sample."""
+        return self.record.to_frame()
 
     def _headline(self) -> str:
         clock = self.record.clock

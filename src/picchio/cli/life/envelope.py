@@ -55,14 +55,13 @@ def envelope(
     """
     import picchio
     from picchio.robot.dynamics.pose import warn_beyond_limits
-    from picchio.studies.default_task import task_of
     from picchio.studies.tasks import blows_of
 
     loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
     blows = blows_of(loaded, force=force, period=period, width=width)
-    at = loaded.pose(pose_given(pose)) if pose else task_of(loaded).operations[0].poses[0]
-    warn_beyond_limits(loaded, [at], "the pose")
+    at = pose_given(pose) if pose else None
     found = picchio.envelope(loaded, at, blows, hits=hits, gravity_stiffness=gravity_stiffness)
+    warn_beyond_limits(loaded, [found.pose], "the pose")
     deliver(found.to_dict(), json, lambda: _show(found))
 
 

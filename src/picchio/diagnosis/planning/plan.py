@@ -25,6 +25,7 @@ from picchio.core.processes import one_thread
 from picchio.core.provenance import provenance
 from picchio.core.registry import classes_in
 from picchio.core.results import TableResult
+from picchio.core.shown import seeing
 from picchio.diagnosis.planning.choose import Choice, Chosen, choose
 from picchio.diagnosis.planning.kind import Test, angles, told_in
 from picchio.diagnosis.planning.outcome import Outcome, decades, outcome_of
@@ -32,6 +33,7 @@ from picchio.prediction.plan import PlannedTest, TestPlan, plan_toml
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.loading.find import typed_name
 from picchio.robot.loading.load import load_robot
+from picchio.robot.loading.objects import RobotLike
 from picchio.studies.default_task import possible_poses, task_of
 from picchio.studies.placement.self_collision import SelfCollision
 from picchio.studies.tasks import Task
@@ -76,6 +78,9 @@ class PlannedTests(TableResult):
         seed: of the draws.
         inputs: files that were read.
     """
+
+    BARS = ("seconds",)
+    PLOTS: ClassVar = {"bars": "visuals.plots.results:plot_columns"}
 
     INDEX = "record"
     UNITS: ClassVar = {"force": "N", "seconds": "s"}
@@ -263,7 +268,7 @@ def _test(name: str) -> Test:
 
 @one_thread()
 def plan(
-    robot: str | Path | FlexibleRobot,
+    robot: RobotLike,
     task: str | Path | Task | None = None,
     *,
     budget: str | float = "20min",
@@ -328,10 +333,11 @@ def plan(
         _test(one.candidate.kind).file.format(k) for k, one in enumerate(records, start=1)
     )
     said = [*notes, *([work.note] if work.note else [])]
-    return PlannedTests(
+    found = PlannedTests(
         loaded, hands, seconds, outcome, choice, records, files, tuple(said), seed,
         (*loaded.files, *work.files),
     )  # fmt: skip
+    return seeing(found, robot=loaded, task=work)
 
 
 def _seconds(budget: str | float) -> float:

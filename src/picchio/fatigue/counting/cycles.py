@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from picchio.core.arrays import FloatArray, as_floats
 from picchio.core.errors import InputError
+from picchio.core.shown import Shown
+
+if TYPE_CHECKING:
+    import pandas
 
 
 @dataclass(frozen=True, eq=False)
-class Cycles:
+class Cycles(Shown):
     """Load cycles, in the order in which they closed; the residue's last.
 
     Attributes:
@@ -20,9 +25,18 @@ class Cycles:
         count: (c,) how often each was counted: 1, or 0.5 for half a cycle.
     """
 
+    PLOTS: ClassVar = {"counted": "visuals.plots.stress:plot_counted_cycles"}
+    LACKS: ClassVar = {"show": "cycles have no place in space"}
+
     range: FloatArray
     mean: FloatArray
     count: FloatArray
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A row a cycle."""
+        import pandas
+
+        return pandas.DataFrame({"range": self.range, "mean": self.mean, "count": self.count})
 
     def __post_init__(self) -> None:
         for name in ("range", "mean", "count"):

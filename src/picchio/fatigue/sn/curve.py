@@ -14,13 +14,17 @@ import dataclasses
 import math
 from dataclasses import dataclass, field
 from statistics import NormalDist
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from picchio.core.arrays import FloatArray, as_floats
 from picchio.core.errors import InputError
+from picchio.core.shown import Shown
+
+if TYPE_CHECKING:
+    import pandas
 
 Kind = Literal["shear", "torque"]
 MinerRule = Literal["original", "elementary", "haibach"]
@@ -36,7 +40,7 @@ _POSITIVE = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class SNCurve:
+class SNCurve(Shown):
     """Shear stress amplitude against cycles to failure, fully reversed.
 
     Attributes:
@@ -64,6 +68,9 @@ class SNCurve:
     Raises:
         InputError: values that do not make a curve.
     """
+
+    PLOTS: ClassVar = {"curve": "visuals.plots.sn:plot_sn_curve"}
+    LACKS: ClassVar = {"show": "a curve has no place in space"}
 
     name: str
     strength: float
@@ -255,6 +262,14 @@ class SNCurve:
         shift = NormalDist().inv_cdf(self.survival) - NormalDist().inv_cdf(wanted)
         moved = self.scaled(10.0 ** (spread * shift), f"survival {self.survival:g} to {wanted:g}")
         return dataclasses.replace(moved, survival=wanted, scatter=spread)
+
+    def to_frame(self) -> pandas.DataFrame:
+        """Where one line ends and the next begins: cycles, amplitude, and the slope up to there."""
+        import pandas
+
+        at = [*self.knees, *([] if len(self.knees) == len(self.slopes) else [self.cycles])]
+        rows = {"cycles": at, "amplitude": self.amplitude(np.array(at)), "slope": self.slopes}
+        return pandas.DataFrame(rows)
 
     def _repr_html_(self) -> str:
         from picchio.core.html import sheet

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import NormalDist
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from picchio.core.arrays import FloatArray, as_floats
 from picchio.core.errors import InputError, warn_user
+from picchio.core.fitted import Fit, FittedValue
 from picchio.core.html import sheet
 from picchio.core.processes import one_thread
 from picchio.core.results import TableResult
@@ -46,8 +49,11 @@ class Estimate:
     high: float
 
 
+_UNITS = {"slope": "", "knee": "cycles", "endurance_limit": "Pa", "design": "Pa", "scatter": ""}
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class SNFit(TableResult):
+class SNFit(TableResult, Fit):
     """A fitted S-N curve; its table is the fitted values with their intervals.
 
     Attributes:
@@ -71,6 +77,9 @@ class SNFit(TableResult):
         covariance: (3, 3) of ln endurance limit, ln knee and ln slope, widened for small samples
             as the intervals are; zeros where there is no knee.
     """
+
+    PLOTS: ClassVar = {"tests": "visuals.plots.sn:plot_sn_fit"}
+    LACKS: ClassVar = {"show": "a curve has no place in space"}
 
     tests: SNTests
     slope: Estimate
@@ -99,10 +108,23 @@ class SNFit(TableResult):
         )
 
     def _rows(self) -> list[dict[str, Any]]:
-        units = {"slope": "", "knee": "cycles", "endurance_limit": "Pa", "design": "Pa",
-                 "scatter": ""}  # fmt: skip
-        told = {name: getattr(self, name) for name in units}
-        return [{"name": n, **vars(e), "unit": units[n]} for n, e in told.items() if e is not None]
+        told = {name: getattr(self, name) for name in _UNITS}
+        return [{"name": n, **vars(e), "unit": _UNITS[n]} for n, e in told.items() if e is not None]
+
+    def _fitted(self) -> Iterator[FittedValue]:
+        wide = 2.0 * NormalDist().inv_cdf(0.5 + 0.5 * self.level)
+        for row in self._rows():
+            value, low, high = row["value"], row["low"], row["high"]
+            yield FittedValue(
+                row["name"],
+                value,
+                (high - low) / wide,
+                row["unit"] or "1",
+                0.0,
+                note=f"{self.level:.0%} between {low:.5g} and {high:.5g}",
+            )
+        if self.knee is None:
+            yield FittedValue("knee", math.inf, math.nan, "cycles", vary=False)
 
     def _repr_html_(self) -> str:
         told = {

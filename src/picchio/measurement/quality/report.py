@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from picchio.measurement.quality.checks.repeats import Comparison, RepeatsCheck
 from picchio.measurement.quality.scan import RecordScan, scan_record
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.loading.load import load_robot
+from picchio.robot.loading.objects import RobotLike
 
 # What is in a campaign: one entry a record, and the campaign as a whole.
 
@@ -124,6 +125,11 @@ class QualityReport(TableResult):
         checks: {name: what it looks for}.
     """
 
+    LACKS: ClassVar = {
+        "plot": "findings are sentences; `picchio.report` draws the records behind them",
+        "show": "findings have no place in space",
+    }
+
     INDEX = ""
     PAGE = "visuals.report.residual:check_page"
 
@@ -205,7 +211,7 @@ class QualityReport(TableResult):
 @one_thread()
 def check(
     campaign: str | Path | Campaign,
-    robot: str | Path | FlexibleRobot | None = None,
+    robot: RobotLike | None = None,
     *,
     flex: str | Path | None = None,
     tool: str | None = None,
@@ -295,7 +301,7 @@ def check(
 
 def _robot(
     campaign: Campaign,
-    robot: str | Path | FlexibleRobot | None,
+    robot: RobotLike | None,
     flex: str | Path | None,
     tool: str | None,
     reducers: Sequence[str | Path],

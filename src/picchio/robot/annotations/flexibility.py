@@ -224,19 +224,20 @@ def _merge(name: str, sources: Sequence[Source]) -> tuple[dict[str, Any], dict[s
         if entry is None:
             continue
         stronger = set(values)
+        outdone = stronger | {EXCLUDED[key] for key in stronger & EXCLUDED.keys()}
         for key, value in given(entry).items():
             if key == "source" or key in values or EXCLUDED.get(key) in values:
                 continue
             # A spread is about the value beside it, not about a stronger source's.
-            if value_of(key) in stronger or EXCLUDED.get(value_of(key)) in stronger:
+            if value_of(key) in outdone:
                 continue
             # An estimate is a statement about the stiffness given beside it.
-            if key == "estimated" and not entry.flexible:
+            if key == "estimated" and (not entry.flexible or "stiffness" in outdone):
                 continue
             values[key] = value
             where[key] = source.origin(getattr(value, "source", None) or entry.source)
             if entry.estimated and entry.flexible and not stronger & set(_spread_keys(key)):
-                guessed |= {key, *entry.implied}
+                guessed |= {key, *(entry.implied.keys() - outdone)}
     return values, where, guessed
 
 

@@ -11,13 +11,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from picchio.core.errors import InputError
-from picchio.core.results import Result
+from picchio.core.results import TableResult
 from picchio.robot.drives.facts import (
     CLASSES,
     Fitted,
@@ -89,7 +89,7 @@ class JointPrior:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DrivePriors(Result):
+class DrivePriors(TableResult):
     """The joint distribution of a robot's n drives.
 
     Attributes:
@@ -105,6 +105,9 @@ class DrivePriors(Result):
         class_probability: of each class; where none is given, what the data teach.
         left_out: why a prismatic joint has no estimate, by its name.
     """
+
+    INDEX = "name"
+    LACKS: ClassVar = dict.fromkeys(("plot", "show"), "it is what is known before any test")
 
     robot: str
     joints: tuple[JointPrior, ...]
@@ -188,6 +191,9 @@ class DrivePriors(Result):
             "left_out": self.left_out,
             "posterior": self.posterior(),
         }
+
+    def _rows(self) -> list[dict[str, Any]]:
+        return [vars(joint) for joint in self.joints]
 
     def _headline(self) -> str:
         widest = max(joint.stiffness_spread for joint in self.joints)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from picchio.core.errors import InputError
 from picchio.core.files import atomic_write
@@ -13,6 +13,7 @@ from picchio.core.results import Result
 from picchio.robot.annotations.annotate import annotate as annotated
 from picchio.robot.annotations.sidecar import read_sidecar
 from picchio.robot.loading.find import find_robot
+from picchio.robot.loading.objects import RobotLike, named
 
 
 @dataclass(eq=False, repr=False)
@@ -25,6 +26,8 @@ class AnnotatedUrdf(Result):
         sidecar: where the values are from.
         file: where it was saved last, or None.
     """
+
+    LACKS: ClassVar = dict.fromkeys(("plot", "show", "to_frame"), "it is a file: load it")
 
     content: bytes
     urdf: Path
@@ -59,17 +62,17 @@ class AnnotatedUrdf(Result):
         }
 
 
-def annotate(robot: str | Path, *, flex: str | Path | None = None) -> AnnotatedUrdf:
+def annotate(robot: RobotLike, *, flex: str | Path | None = None) -> AnnotatedUrdf:
     """A URDF with a sidecar's values as annotations; everything else in it stays as it is.
 
     Args:
-        robot: a name from `picchio.robots()`, or a path to a URDF. Its meshes are not copied.
+        robot: as `load_robot` takes it; of one that is loaded, its files. No meshes are copied.
         flex: the sidecar; the robot's own flex.toml if None.
 
     Raises:
         InputError: no sidecar, or one that does not go with the URDF.
     """
-    found = find_robot(robot)
+    found = find_robot(named(robot))
     sidecar = flex or found.flex
     if sidecar is None:
         raise InputError("this robot has no flex.toml of its own", key="flex",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from picchio.core.errors import InputError
 from picchio.core.html import sheet
@@ -49,6 +49,8 @@ class RobotList(TableResult):
     Attributes:
         entries: this project's robots, then those of example-robot-data.
     """
+
+    LACKS: ClassVar = {"plot": "it is a list to read", "show": "it is a list to read"}
 
     entries: tuple[RobotEntry, ...]
 

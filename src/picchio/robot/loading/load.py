@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from lxml import etree
 
-from picchio.core.errors import InputError, gathered, held_back, warn_user
+from picchio.core.errors import InputError, held_back, warn_user
 from picchio.core.guard import guard
 from picchio.core.toml import validate
 from picchio.robot.annotations.flexibility import (
@@ -34,6 +35,7 @@ from picchio.robot.dynamics.rigid_model import RigidModel
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.joint import Joint, is_drive
 from picchio.robot.loading.find import FoundRobot, find_robot
+from picchio.robot.loading.objects import RobotLike, named
 from picchio.robot.loading.saved_model import is_saved_model, read_saved_model
 from picchio.robot.masses.check import check_masses
 from picchio.robot.masses.doubts import findings_of
@@ -47,11 +49,12 @@ from picchio.robot.urdf.xml import parse_urdf, read_urdf_bytes
 
 
 def load_robot(
-    robot: str | Path | FlexibleRobot,
+    robot: RobotLike,
     *,
     flex: str | Path | None = None,
     tool: str | None = None,
     values: Mapping[str, Mapping[str, object]] | None = None,
+    carries: Mapping[str, object] | None = None,
     reducers: str | Path | Sequence[str | Path] = (),
     allow_rigid: bool = False,
     payload: float | None = None,
@@ -67,11 +70,15 @@ def load_robot(
     Args:
         robot: a name from `picchio robots`, a path to a URDF or to a robot's folder, a
             `package://` address, or a saved model (`picchio-model/1`, a .toml file). A robot
-            that is loaded already is taken as it is.
+            that is loaded already is taken as it is. A `yourdfpy.URDF` is read from the XML that
+            it writes, which has no annotations; of a pair of a Pinocchio model and its URDF's
+            path the URDF is read, and the model must be the same.
         flex: a sidecar `picchio-sidecar/1`.
         tool: the frame that carries the tool.
         values: values that win over every file, by joint and key, as in a sidecar:
             `{"joint_1": {"stiffness": 1e5}}`.
+        carries: what the tool's frame carries, in place of what the files say, by the keys of a
+            sidecar's `[tool]`: `{"mass": 4.0}`.
         reducers: catalogues of reducers `picchio-reducers/1`, stronger than the shipped ones.
         allow_rigid: accept a robot none of whose joints is flexible, and estimate nothing.
         payload: kg, the robot's rated one, for the estimate.
@@ -86,18 +93,16 @@ def load_robot(
     """
     if isinstance(robot, FlexibleRobot):
         for key, given in (("flex", flex), ("tool", tool), ("values", values),
-                           ("reducers", reducers or None)):  # fmt: skip
+                           ("carries", carries), ("reducers", reducers or None)):  # fmt: skip
             if given is not None:
                 raise InputError("comes too late for a robot that is loaded", key=key,
                                  hint="give the robot's name or file with it")  # fmt: skip
         return robot
     if isinstance(reducers, str | Path):
         reducers = (reducers,)
-    asked = (robot, flex, tool, values, reducers)
-    from picchio.robot.estimate.sidecar import refused_efforts
-
+    made = partial(_made, named(robot), flex, tool, reducers, values=values, carries=carries)
     with held_back() as remarks:
-        loaded = _load(*asked, None)
+        loaded = made(None)
     known = {"payload": payload, "reach": reach, "drive_class": drive_class}
     guess = None if allow_rigid else _estimate(loaded, known)
     unused = [key for key, value in known.items() if value is not None]
@@ -105,16 +110,50 @@ def load_robot(
         warn_user(f"{', '.join(unused)}: not used, since nothing of {loaded.name}'s drives is "
                   "estimated")  # fmt: skip
     if guess is not None:
-        with held_back() as remarks:  # the same again, and what the estimates bring
-            loaded = _load(*asked, Source(ESTIMATE, guess, strict=False))
+        return made(guess)  # the same again, and what the estimates bring
+    for remark in remarks:
+        warn_user(remark)
+    return loaded
+
+
+def _made(
+    robot: str | Path,
+    flex: str | Path | None,
+    tool: str | None,
+    reducers: Sequence[str | Path],
+    guess: Sidecar | None,
+    *,
+    values: Mapping[str, Mapping[str, object]] | None,
+    carries: Mapping[str, object] | None,
+) -> FlexibleRobot:
+    """A robot that keeps what it was warned of, and can be made again with other values."""
+    from picchio.robot.estimate.sidecar import refused_efforts
+
+    argument = _argument("argument", values, carries)
+    weakest = None if guess is None else Source(ESTIMATE, guess, strict=False)
+    with held_back() as remarks:
+        loaded = _load(robot, flex, tool, [argument], reducers, weakest)
+        if guess is not None:
             if any(entry.flexible for entry in guess.joint.values()):
                 warn_user(estimate_notice(loaded.name, loaded.origins))
             for why in dict.fromkeys(refused_efforts(loaded).values()):
                 warn_user(f"the URDF's effort limits are not believed, and count as unknown: {why}")
-    with gathered() as said:
-        for remark in remarks:
-            warn_user(remark)
-    return replace(loaded, warnings=tuple(said))
+    said = tuple(dict.fromkeys(remarks))
+    for remark in said:
+        warn_user(remark)
+    again = partial(_made, robot, flex, tool, reducers, guess, values=values, carries=carries)
+    return replace(loaded, warnings=said, again=again)
+
+
+def _argument(
+    label: str,
+    values: Mapping[str, Mapping[str, object]] | None,
+    carries: Mapping[str, object] | None,
+) -> Source:
+    """Values by joint, and what the tool's frame carries, as a sidecar has them."""
+    given: dict[str, Any] = {"joint": {key: dict(v) for key, v in (values or {}).items()}}
+    given |= {} if carries is None else {"tool": dict(carries)}
+    return Source(label, validate({"format": FORMAT, **given}, Sidecar, format=FORMAT))
 
 
 def _estimate(robot: FlexibleRobot, known: Mapping[str, Any]) -> Sidecar | None:
@@ -162,7 +201,7 @@ def _load(
     robot: str | Path,
     flex: str | Path | None,
     tool: str | None,
-    values: Mapping[str, Mapping[str, object]] | None,
+    arguments: list[Source],
     reducers: Sequence[str | Path],
     guess: Source | None,
 ) -> FlexibleRobot:
@@ -170,7 +209,8 @@ def _load(
         saved = read_saved_model(Path(robot))
         flex, tool = flex or saved.flex, tool or saved.tool
         try:
-            loaded = _load(saved.robot, flex, tool, values, reducers, guess)
+            own = _argument(Path(robot).name, saved.values, saved.carries)
+            loaded = _load(saved.robot, flex, tool, [*arguments, own], reducers, guess)
         except InputError as error:
             if error.key != "ROBOT":
                 raise
@@ -182,7 +222,7 @@ def _load(
     root = parse_urdf(read_urdf_bytes(found.urdf), found.urdf)
     tree = read_tree(root, found.urdf)
     srdf = find_srdf(tree)
-    sources, flex_file = _sources(root, found, flex, values, srdf)
+    sources, flex_file = _sources(root, found, flex, arguments, srdf)
     if guess is not None:
         sources.append(guess)
     joints, origins, spreads = flexible_joints(tree, sources, all_reducers(reducers))
@@ -237,7 +277,7 @@ def _sources(
     root: etree._Element,
     found: FoundRobot,
     flex: str | Path | None,
-    values: Mapping[str, Mapping[str, object]] | None,
+    arguments: list[Source],
     srdf: Srdf | None,
 ) -> tuple[list[Source], Path | None]:
     """Everything that speaks about the joints, the strongest first, and the sidecar used."""
@@ -250,11 +290,7 @@ def _sources(
         elif not _same(read_sidecar(found.flex), annotation):
             warn_user(f"{found.flex}: is not read, since {found.urdf.name} has annotations that "
                       "say something else; name it with --flex, and it wins")  # fmt: skip
-    sources = []
-    if values:
-        given = validate({"format": FORMAT, "joint": {k: dict(v) for k, v in values.items()}},
-                         Sidecar, format=FORMAT)  # fmt: skip
-        sources.append(Source("argument", given))
+    sources = [*arguments]
     if flex_file is not None:
         sidecar = read_sidecar(flex_file)
         _check_owner(sidecar, flex_file, found, str(root.get("name")))

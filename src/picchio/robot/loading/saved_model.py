@@ -43,6 +43,8 @@ class SavedModel(StrictModel):
             command then does so, too, unless told otherwise.
         notes: free text.
         provenance: where the model comes from; any keys.
+        values: of joints, in place of those of the robot's files: [values.NAME] stiffness = ...
+        carries: what the tool's frame carries, in place of what the files say.
         effect: how the real robot differs from its files, one table for each effect.
     """
 
@@ -52,6 +54,8 @@ class SavedModel(StrictModel):
     gravity_stiffness: bool | None = None
     notes: str | None = None
     provenance: dict[str, Any] | None = None
+    values: dict[str, dict[str, Any]] = Field(default_factory=dict)
+    carries: dict[str, Any] | None = None
     effect: list[EffectTable] = Field(default_factory=list)
 
 
@@ -91,6 +95,8 @@ def saved_model_text(
     notes: str | None = None,
     folder: Path | None = None,
     provenance: Mapping[str, Any] | None = None,
+    values: Mapping[str, Mapping[str, object]] | None = None,
+    carries: Mapping[str, object] | None = None,
 ) -> str:
     """A saved model as TOML.
 
@@ -103,6 +109,8 @@ def saved_model_text(
         notes: free text.
         folder: where the file will stand; paths are written relative to it.
         provenance: where it comes from.
+        values: see `load_robot`.
+        carries: likewise.
     """
     import tomlkit
 
@@ -112,7 +120,7 @@ def saved_model_text(
     if flex is not None:
         document["flex"] = _relative(str(flex), folder)
     given = {"tool": tool, "gravity_stiffness": gravity_stiffness, "notes": notes,
-             "provenance": provenance}  # fmt: skip
+             "provenance": provenance, "values": values or None, "carries": carries}  # fmt: skip
     for key, value in given.items():
         if value is not None:
             document[key] = value

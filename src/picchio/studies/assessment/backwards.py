@@ -18,6 +18,7 @@ from picchio.core.errors import InputError
 from picchio.core.html import sheet
 from picchio.core.processes import one_thread
 from picchio.core.results import TableResult
+from picchio.core.shown import seeing
 from picchio.fatigue.counting.counter import Residue, rainflow
 from picchio.fatigue.counting.cycles import Cycles
 from picchio.fatigue.mean_stress import Rule
@@ -25,13 +26,13 @@ from picchio.fatigue.miner import damage, utilisation
 from picchio.fatigue.shaft_stress import check_shaft
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.fatigue.sn.library import DEFAULT_SN_CURVE, load_sn_curve
-from picchio.model.model import Model
+from picchio.model.model import Model, ModelLike
 from picchio.robot.annotations.flexibility import estimate_notice
 from picchio.robot.drives.reducer import Reducer, all_reducers
 from picchio.robot.estimate.rigid import left_rigid
-from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.joint import Joint, Strength, is_drive
 from picchio.studies.assessment.verdict import SHAFT_TOLERANCE, Status, softer
+from picchio.studies.default_task import LIFE, TaskLike, task_of
 from picchio.studies.rivet.life_rules import RainflowRule, curves_of
 from picchio.studies.rivet.pose import JointLoad, need_springs
 from picchio.studies.rivet.variation import VariedRivet, WornParts, rivets_of
@@ -122,6 +123,8 @@ class AllowableLoads(TableResult):
     """
 
     INDEX = "joint"
+    BARS = ("force_factor",)
+    PLOTS: ClassVar = {"bars": "visuals.plots.results:plot_columns"}
     UNITS: ClassVar[Mapping[str, str]] = {
         "radius": "m", "life": "1", "rivets": "1", "peak_torque": "N m",
     }  # fmt: skip
@@ -280,9 +283,9 @@ class AllowableLoads(TableResult):
 
 @one_thread()
 def allowable(
-    robot: FlexibleRobot | Model,
-    task: Task,
-    rivets: float,
+    robot: ModelLike,
+    task: TaskLike = None,
+    rivets: float = LIFE,
     *,
     survival: float | None = None,
     sn_curve: str | SNCurve | None = None,
@@ -301,7 +304,7 @@ def allowable(
 
     Args:
         robot: with stiffnesses, and shafts or reducers where they are known; or a model of it.
-        task: what it does.
+        task: what it does; as in `assess`.
         rivets: the target life, in rivets of the task's mix.
         survival: move each curve to this probability; None leaves it.
         sn_curve: for all joints, instead of their own.
@@ -327,6 +330,7 @@ def allowable(
     if not (math.isfinite(rivets) and rivets > 0):
         raise InputError("must be positive", key="rivets", value=rivets)
     model = Model.of(robot, gravity_stiffness=gravity_stiffness, gravity_balanced=gravity_balanced)
+    task = task_of(model.robot, task)
     need_springs(model.robot)
     curves = curves_of(model.robot, sn_curve)
     steel = sn_curve if isinstance(sn_curve, SNCurve) else load_sn_curve(
@@ -351,7 +355,7 @@ def allowable(
     notes = [*model.without_load(), *search.notes(joints)]
     if model.robot.spreads and any(part.curve or part.ratings for part in parts):
         held, intervals = search.drawn(factor, strongest, notes)
-    return AllowableLoads(
+    found = AllowableLoads(
         joints,
         tuple(notes),
         force_factor=factor,
@@ -373,6 +377,7 @@ def allowable(
         intervals=intervals,
         estimated=bool(estimate_notice(model.robot.name, model.robot.origins)),
     )
+    return seeing(found, robot=model, task=task)
 
 
 def _size(reducer: Reducer) -> tuple[float, float, float, str]:

@@ -14,7 +14,7 @@ from picchio.core.errors import held_back
 from picchio.fatigue.miner import life
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.fatigue.sn.library import DEFAULT_SN_CURVE, PAPER_SN_CURVE, load_sn_curve
-from picchio.model.model import Model
+from picchio.model.model import ModelLike
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.assessment.result import Assessment
 from picchio.studies.assessment.run import assess
@@ -42,9 +42,7 @@ class Term:
     factor: float
 
 
-def compare_methods(
-    robot: FlexibleRobot | Model, task: Task, sn_curve: SNCurve
-) -> tuple[Term, ...]:
+def compare_methods(robot: ModelLike, task: Task, sn_curve: SNCurve) -> tuple[Term, ...]:
     """From the paper's method to the default one, term by term.
 
     Endless lives can't be compared, so the default curve is first carried on below its endurance

@@ -12,8 +12,10 @@ import numpy as np
 
 from picchio.core import spoken
 from picchio.core.arrays import FloatArray, TextArray
+from picchio.core.errors import InputError
 from picchio.core.html import sheet
 from picchio.core.results import TableResult
+from picchio.core.shown import named_function
 from picchio.fatigue.standstill import RISKS, FalseBrinelling
 from picchio.robot.annotations.flexibility import estimate_notice
 from picchio.robot.joint import ESTIMATED_DRIVE
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
     from picchio.robot.estimate.rigid import LeftRigid
     from picchio.studies.assessment.backwards import AllowableLoads
     from picchio.studies.uncertainty.result import UncertainLife
+    from picchio.visuals.worst_rivet import WorstRivet
 
 # What an assessment found: the life of every joint, and where it goes.
 
@@ -314,6 +317,11 @@ class Assessment(TableResult):
     """
 
     PAGE = "visuals.report.assessment:assessment_report"
+    PLOTS: ClassVar = {
+        "utilisation": "visuals.plots.life:plot_utilisation",
+        "damage": "visuals.plots.life:plot_damage",
+        "torque": "visuals.plots.life:plot_peak_torque",
+    }
     UNITS: ClassVar[Mapping[str, str]] = {
         "peak_deflection": "rad",
         "peak_torque": "N m",
@@ -361,6 +369,22 @@ class Assessment(TableResult):
     def verdict(self) -> Verdict:
         """What it comes to: safe, limited, fails or cannot be told, by what, and how surely."""
         return judge(self)
+
+    def _seen(self) -> Mapping[str, Any]:
+        seen = super()._seen()
+        return seen and {**seen, "assessment": self}
+
+    def worst_rivet(self) -> WorstRivet:
+        """The rivet where the part that governs the verdict fares worst, in full.
+
+        Raises:
+            InputError: nothing is known of the loads; an assessment that was read from a file.
+        """
+        if not (seen := super()._seen()):
+            raise InputError(
+                "was read from a file: it has no robot by it", key="assessment", value=self.robot
+            )
+        return named_function("visuals.worst_rivet:worst_rivet")(self, **seen)  # type: ignore[no-any-return]
 
     def joint(self, name: str) -> JointLife:
         """The entry of one joint.

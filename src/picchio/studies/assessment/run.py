@@ -13,6 +13,7 @@ from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError, gathered, warn_user
 from picchio.core.processes import one_thread
 from picchio.core.provenance import provenance
+from picchio.core.shown import seeing
 from picchio.fatigue.counting.counter import Residue
 from picchio.fatigue.mean_stress import Rule
 from picchio.fatigue.miner import life, peak_damage
@@ -20,7 +21,7 @@ from picchio.fatigue.shaft_stress import check_shaft, shear_stress
 from picchio.fatigue.sn.curve import MinerRule, SNCurve
 from picchio.fatigue.sn.library import PAPER_SN_CURVE, load_sn_curve
 from picchio.fatigue.standstill import false_brinelling, swings
-from picchio.model.model import Model
+from picchio.model.model import Model, ModelLike
 from picchio.robot.annotations.tool_choice import tool_place
 from picchio.robot.drives.reducer import Reducer
 from picchio.robot.dynamics.pose import warn_beyond_limits
@@ -39,7 +40,7 @@ from picchio.studies.assessment.checks import (
 )
 from picchio.studies.assessment.inputs import inputs_of
 from picchio.studies.assessment.result import Assessment, JointLife, OperationResult
-from picchio.studies.default_task import LIFE, task_of
+from picchio.studies.default_task import LIFE, TaskLike, task_of
 from picchio.studies.rivet.life_rules import LifeRule, PaperRule, RainflowRule, curves_of, peak
 from picchio.studies.rivet.pose import Rivet, need_springs
 from picchio.studies.tasks import Operation, Task
@@ -60,8 +61,8 @@ _LARGEST = (
 
 @one_thread()
 def assess(
-    robot: FlexibleRobot | Model,
-    task: Task | None = None,
+    robot: ModelLike,
+    task: TaskLike = None,
     *,
     method: Method = "rainflow",
     sn_curve: str | SNCurve | None = None,
@@ -78,8 +79,10 @@ def assess(
     """Life of every joint of a robot on a riveting task (paper section 3.4, eqs. 18-22).
 
     Args:
-        robot: with stiffnesses, and shafts where stresses are wanted; or a model of it.
-        task: operations and poses; the robot's example if not given, else `default_task`.
+        robot: as `load_robot` takes it, with stiffnesses, and shafts where stresses are wanted; or
+            a model of it.
+        task: operations and poses, or their file; the robot's example if not given, else
+            `default_task`: rivets of 12 blows of 300 N, 4 ms wide, one every 40 ms.
         method: "rainflow" (each rivet from rest, ring-down included, cycles counted) or
             "paper" (steady state, peak stress, one cycle a hit).
         sn_curve: for all joints, instead of their own.
@@ -195,7 +198,7 @@ def assess(
     lasts = limiting.life if limiting else math.inf
     if unsure is not None and unsure.estimated:
         lasts = unsure.robot.p50
-    return Assessment(
+    found = Assessment(
         robot=robot.name,
         method="paper, at the poses' mean stress" if paper_mean_stress else method,
         sn_curve=", ".join(dict.fromkeys(c.name for c in curves if c is not None)),
@@ -228,6 +231,7 @@ def assess(
         tool=place,
         allowable=allowed,
     )
+    return seeing(found, robot=model, task=task)
 
 
 @dataclass(frozen=True)

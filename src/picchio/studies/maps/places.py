@@ -13,6 +13,8 @@ from picchio.core.arrays import FloatArray, IndexArray
 from picchio.core.errors import InputError
 from picchio.core.tables import read_columns
 from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.robot.loading.load import load_robot
+from picchio.robot.loading.objects import RobotLike
 from picchio.robot.urdf.shapes import load_parts
 
 PLANES = ("xy", "xz", "yz")
@@ -92,7 +94,7 @@ Places = Grid | Listed
 
 
 def plane(
-    robot: FlexibleRobot,
+    robot: RobotLike,
     name: str = "xz",
     *,
     at: float = 0.0,
@@ -102,7 +104,7 @@ def plane(
     """The points on a plane through the workspace.
 
     Args:
-        robot: whose reach gives the bounds where none are given.
+        robot: whose reach gives the bounds where none are given; as `load_robot` takes it.
         name: "xy", "xz" or "yz".
         at: m, where the plane cuts the third axis.
         spacing: m; a fiftieth of the width if not given.
@@ -116,7 +118,7 @@ def plane(
     if not math.isfinite(at):
         raise InputError("must be a finite number", key="at", value=at)
     first, second = (_AXES.index(letter) for letter in name)
-    low, high = reach_box(robot)
+    low, high = reach_box(load_robot(robot))
     own = (low[first], high[first], low[second], high[second])
     limits = _limits(own if bounds is None else bounds, 4)
     step = (limits[1] - limits[0]) / 50 if spacing is None else float(spacing)

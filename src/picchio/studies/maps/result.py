@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,6 +78,8 @@ class WorkspaceMap(TableResult):
         path: the file.
     """
 
+    PLOTS: ClassVar = {"map": "visuals.plots.results:plot_map"}
+
     dataset: xarray.Dataset
     path: Path
 
@@ -112,6 +115,13 @@ class WorkspaceMap(TableResult):
             for joint in self._content()["joints"]
         ]
         return pandas.DataFrame(rows).set_index("name")
+
+    def _seen(self) -> Mapping[str, Any]:
+        seen = super()._seen()
+        if not seen:
+            return seen
+        worst = max(self._content()["joints"], key=lambda joint: joint["peak_deflection"])
+        return {**seen, "workspace": self, "pose": worst["pose"], "joint": worst["name"]}
 
     def _headline(self) -> str:
         robot = attribute_of(self.dataset, "robot")

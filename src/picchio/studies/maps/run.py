@@ -19,22 +19,23 @@ from typing import Any
 import numpy as np
 
 from picchio.core.errors import InputError, OutputError
-from picchio.core.files import atomic_write, locked, write_text, writing
+from picchio.core.files import atomic_write, locked, temporary_folder, write_text, writing
 from picchio.core.processes import one_thread
 from picchio.core.provenance import provenance
+from picchio.core.shown import seeing
 from picchio.core.spread import require_scheduler, spread
 from picchio.core.unfinished import remove, unfinished
 from picchio.excitation.excitation import Excitation
 from picchio.excitation.piecewise import check_hits
-from picchio.model.model import Model
+from picchio.model.model import Model, ModelLike
 from picchio.robot.annotations.flexibility import estimate_notice
-from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.maps.chunk import LEVELS, Columns, MapJob
 from picchio.studies.maps.files import join_chunks
-from picchio.studies.maps.places import Places
+from picchio.studies.maps.places import Places, plane
 from picchio.studies.maps.result import WorkspaceMap
 from picchio.studies.maps.stored import open_map
 from picchio.studies.rivet.pose import need_springs
+from picchio.studies.tasks import blows_of
 from picchio.vibration.closed_form.response import described, unit_vector
 
 SMALL_CHUNK, CHUNK, FAST_CHUNK = 64, 4096, 16384
@@ -55,10 +56,10 @@ _Running = Generator[tuple[tuple[int, int], Columns | None]]
 
 @one_thread()
 def workspace_map(
-    robot: FlexibleRobot | Model,
-    places: Places,
-    excitation: Excitation,
-    out: str | Path,
+    robot: ModelLike,
+    places: Places | str = "xz",
+    excitation: Excitation | None = None,
+    out: str | Path | None = None,
     *,
     direction: Any = "worst",
     branch: str = "all",
@@ -73,10 +74,12 @@ def workspace_map(
     """Compute a map, or resume one that was stopped, and open it.
 
     Args:
-        robot: with stiffnesses; or a model of it.
-        places: points or poses; see `picchio.studies.maps.places`.
-        excitation: the blows.
-        out: `.nc` for netCDF, `.zarr` for Zarr. Unfinished work is kept beside it.
+        robot: as `load_robot` takes it, with stiffnesses; or a model of it.
+        places: points or poses, as `picchio.plane` makes them; "xy", "xz" or "yz" is the plane
+            through the world's origin, some fifty places wide.
+        excitation: the blows; as in `envelope` if not given.
+        out: `.nc` for netCDF, `.zarr` for Zarr. Unfinished work is kept beside it. A file that
+            lasts as long as this process if not given.
         direction: (3,) for one force direction, "worst" for each joint's own worst, "normal" for
             the surface's normal.
         branch: "all" branches of the inverse kinematics, "any" one, or words that choose.
@@ -100,7 +103,10 @@ def workspace_map(
     """
     model = Model.of(robot)
     robot = model.robot
-    target = Path(out)
+    if isinstance(places, str):
+        places = plane(robot, places)
+    excitation = excitation or blows_of(robot)
+    target = Path(out) if out is not None else temporary_folder() / "map.nc"
     if target.suffix not in ENDINGS:
         raise InputError("unknown ending", key="out", value=target.name, choices=ENDINGS)
     if not target.parent.is_dir():
@@ -182,7 +188,8 @@ def workspace_map(
             remove(folder)
             raise
         remove(folder)
-    return WorkspaceMap(open_map(target), target)
+    found = WorkspaceMap(open_map(target), target)
+    return seeing(found, robot=model, excitation=excitation, hits=hits)
 
 
 def _folder_of(target: Path) -> Path:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from picchio.core.arrays import FloatArray
 from picchio.core.html import sheet
@@ -163,6 +163,9 @@ class Placement(TableResult):
         assumptions: what was taken for granted, a sentence each.
         provenance: version, seed and hashes.
     """
+
+    BARS = ("utilisation_now", "utilisation_best")
+    PLOTS: ClassVar = {"bars": "visuals.plots.results:plot_columns"}
 
     robot: str
     by_effort: bool

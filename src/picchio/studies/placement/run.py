@@ -18,12 +18,13 @@ from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError, warn_user
 from picchio.core.processes import one_thread
 from picchio.core.provenance import provenance
+from picchio.core.shown import seeing
 from picchio.fatigue.miner import life
 from picchio.fatigue.sn.curve import SNCurve
-from picchio.model.model import Model
+from picchio.model.model import Model, ModelLike
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.ik.chain import tool_chain
-from picchio.studies.default_task import task_of
+from picchio.studies.default_task import TaskLike, task_of
 from picchio.studies.placement.loads import Loads
 from picchio.studies.placement.reach import Candidates
 from picchio.studies.placement.result import JointUse, Off, Placement, Standing
@@ -42,8 +43,8 @@ _PERIODS = 7
 
 @one_thread()
 def place(
-    robot: FlexibleRobot | Model,
-    task: Task | None = None,
+    robot: ModelLike,
+    task: TaskLike = None,
     *,
     move: Sequence[float] | None = None,
     period_range: tuple[float, float] | None = None,
@@ -134,7 +135,7 @@ def place(
         alone = now
     if alone is not None and not _exact(then).better_than(_exact(alone)):
         then = alone
-    return Placement(
+    found = Placement(
         robot=robot.name,
         by_effort=loads.by_effort,
         start=now,
@@ -152,6 +153,24 @@ def place(
         ),
         assumptions=_assumptions(loads, meshes),
         provenance=provenance([*robot.files, *task.files], seed=seed),
+    )
+    return seeing(found, robot=model, task=_moved(task, work, then.spot))
+
+
+def _moved(task: Task, work: Work, spot: Spot) -> Task:
+    """The task with its work at another spot."""
+    turn, period = work.turn(spot.move[3]), spot.period
+    return replace(
+        task,
+        operations=tuple(
+            replace(
+                op,
+                direction=turn @ op.direction,
+                poses=spot.poses[work.operation == k],
+                excitation=op.excitation if period is None else op.excitation.with_period(period),
+            )
+            for k, op in enumerate(task.operations)
+        ),
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -77,6 +77,11 @@ class UncertainLife(TableResult):
         ends_first: of each flexible joint the share of the samples in which it ends the life.
         measure_first: what a measurement would leave of the interval, the best one first.
     """
+
+    PLOTS: ClassVar = {
+        "life": "visuals.plots.life:plot_life_spread",
+        "scan": "visuals.plots.results:plot_scan",
+    }
 
     joints: dict[str, LifeSpread]
     robot: LifeSpread

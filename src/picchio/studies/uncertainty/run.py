@@ -7,15 +7,15 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from picchio.core.processes import one_thread
+from picchio.core.shown import seeing
 from picchio.fatigue.counting.counter import Residue
 from picchio.fatigue.mean_stress import Rule
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.fatigue.uncertain_lives import QUANTILES, Draws, Uncertain, summarise
-from picchio.model.model import Model
-from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.model.model import Model, ModelLike
 from picchio.robot.spread import root_of
+from picchio.studies.default_task import TaskLike, task_of
 from picchio.studies.rivet.variation import WornParts
-from picchio.studies.tasks import Task
 from picchio.studies.uncertainty.drawn import Drawn
 from picchio.studies.uncertainty.measurements import measure_first
 from picchio.studies.uncertainty.result import UncertainLife
@@ -29,8 +29,8 @@ _FEWEST, _MIXED = 512, 8
 
 @one_thread()
 def uncertain_life(
-    robot: FlexibleRobot | Model,
-    task: Task,
+    robot: ModelLike,
+    task: TaskLike = None,
     *,
     sn_curve: str | SNCurve | None = None,
     inputs: Mapping[str, Uncertain] | None = None,
@@ -56,7 +56,7 @@ def uncertain_life(
 
     Args:
         robot: with shafts or reducers; or a model of it.
-        task: what it does.
+        task: what it does; as in `assess`.
         sn_curve: for all joints, instead of their own.
         inputs: factors on the nominal values, by name: "stiffness", "damping_ratio", "force",
             "width" (of the blows), "model" (error of the computed stress); if not given,
@@ -81,6 +81,7 @@ def uncertain_life(
             none.
     """
     model = Model.of(robot, gravity_stiffness=gravity_stiffness, gravity_balanced=gravity_balanced)
+    task = task_of(model.robot, task)
     geared = any(joint.reducer for joint in model.robot.flexible_joints)
     stress = WornParts.of(model.robot, sn_curve, None, residue, mean_stress, needed=not geared)
     notes: list[str] = []
@@ -124,7 +125,7 @@ def uncertain_life(
             "correlated values share independent normal factors by the symmetric root of their "
             "correlation matrix; a share is that of the factor nearest to its value"
         )
-    return UncertainLife(
+    answer = UncertainLife(
         joints=spreads,
         robot=summarise(
             names,
@@ -156,3 +157,4 @@ def uncertain_life(
         },
         measure_first=measure_first(model.robot, sampler.inputs, every, flat, root @ root),
     )
+    return seeing(answer, robot=model, task=task)

@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from picchio.core.arrays import ComplexArray, FloatArray
+from picchio.core.errors import InputError
+from picchio.core.shown import Shown
 from picchio.model.linear_system import LinearSystem, undamped_modes
+from picchio.model.model import Model, ModelLike
+
+if TYPE_CHECKING:
+    import pandas
 
 # Largest off-diagonal term of S^T C S, relative to its diagonal, that counts as rounding.
 _DECOUPLED = 1e-10
@@ -19,7 +27,7 @@ _NUDGE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Modes:
+class Modes(Shown):
     """The system in modal form.
 
     The response of output j to a force F(t) n is the sum over poles of
@@ -35,6 +43,12 @@ class Modes:
         decoupled: whether the damping leaves the undamped modes uncoupled.
         output_names: m names.
     """
+
+    PLOTS: ClassVar = {
+        "shapes": "visuals.plots.frequency:plot_mode_shapes",
+        "response": "visuals.plots.frequency:plot_frequency_response",
+    }
+    LACKS: ClassVar = {"show": "show the robot's envelope: the scene plays its modes"}
 
     natural_frequencies: FloatArray
     damping_ratios: FloatArray
@@ -56,6 +70,19 @@ class Modes:
         head = f"{', '.join(f'{f:.4g}' for f in self.natural_frequencies)} Hz"
         return sheet(f"Modes of {', '.join(self.output_names)}", None, columns, rows, head=head)
 
+    def to_frame(self) -> pandas.DataFrame:
+        """A row a mode: frequency (Hz), damping ratio, and the deflections of its shape."""
+        import pandas
+
+        shapes = dict(zip(self.output_names, self.mode_shapes, strict=False))
+        return pandas.DataFrame(
+            {
+                "natural_frequency": self.natural_frequencies,
+                "damping_ratio": self.damping_ratios,
+                **shapes,
+            }
+        ).rename_axis("mode")
+
     def frequency_response(self, angular_frequency: FloatArray) -> ComplexArray:
         """The deflection per newton (m, 3, k), complex, rad/N.
 
@@ -68,24 +95,31 @@ class Modes:
         return np.einsum("mpd,pk->mdk", residues, 1.0 / (s - poles[:, None]))
 
 
-def modal_analysis(system: LinearSystem) -> Modes:
-    """Poles and residues of a linear system.
+def modal_analysis(system: LinearSystem | ModelLike, pose: ArrayLike | None = None) -> Modes:
+    """Poles and residues of a linear system, or of a robot at a pose.
 
     Where the damping is proportional to the modes (paper eq. 11) the poles are those of single
     oscillators, under-, over- or undamped. Other damping couples them: the complex modes of the
     state-space form are taken, exact all the same.
 
     Args:
-        system: M, C, K, and where force goes in.
+        system: M, C, K, and where force goes in; or a robot as `load_robot` takes it, or its
+            model.
+        pose: (nv,) rad or m, of a robot.
 
     Returns:
         the modes.
 
     Raises:
-        InputError: M or K is not positive definite.
+        InputError: M or K is not positive definite; a robot without a pose.
 
     Source: Ewins, Modal Testing (2000), ch. 2; Golla and Hughes state-space form.
     """
+    if not isinstance(system, LinearSystem):
+        model = Model.of(system)
+        if pose is None:
+            raise InputError("is needed: modes are those of a robot at a pose", key="pose")
+        system = model.linear_system(model.robot.pose(pose))
     omega, shapes = undamped_modes(system.mass_matrix, system.stiffness_matrix)
     damping = shapes.T @ system.damping_matrix @ shapes
     scale = np.sqrt(np.abs(np.outer(damping.diagonal(), damping.diagonal())))

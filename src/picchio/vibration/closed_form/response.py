@@ -8,15 +8,17 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from picchio.core.arrays import ComplexArray, FloatArray, IndexArray
 from picchio.core.errors import InputError
+from picchio.core.shown import Shown
 from picchio.excitation.excitation import Excitation
 from picchio.excitation.piecewise import PiecewiseForce
+from picchio.excitation.pulse_train import USUAL_BLOWS, USUAL_HITS
 from picchio.vibration.closed_form.extrema import Grid, golden_maximum, refine_roots
 from picchio.vibration.closed_form.modes import Modes
 
@@ -44,7 +46,7 @@ class WorstDirection(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Response:
+class Response(Shown):
     """The deflection of every joint, in closed form, for a force in any direction.
 
     Attributes:
@@ -54,10 +56,20 @@ class Response:
         periodic: whether the response repeats with the force's period.
     """
 
+    PLOTS: ClassVar = {"deflection": "visuals.plots.response:plot_response"}
+    LACKS: ClassVar = {
+        "show": "show the robot's envelope",
+        "to_frame": "choose times: `deflection`",
+    }
+
     modes: Modes
     force: PiecewiseForce
     states: ComplexArray
     periodic: bool
+
+    def __repr__(self) -> str:
+        what = "steady state" if self.periodic else "from rest"
+        return f"Response({', '.join(self.modes.output_names)}; {what})"
 
     @property
     def horizon(self) -> float:
@@ -388,7 +400,7 @@ def described(hits: int | None) -> str:
     return "steady state" if hits is None else f"{hits} hit{'s' * (hits > 1)} from rest"
 
 
-def steady_state(modes: Modes, excitation: Excitation | PiecewiseForce) -> Response:
+def steady_state(modes: Modes, excitation: Excitation | PiecewiseForce = USUAL_BLOWS) -> Response:
     """The exact periodic response, no Fourier sum: paper eq. 13 without truncation.
 
     Between the jumps of the force each mode is a free decay about a particular solution; the
@@ -396,7 +408,8 @@ def steady_state(modes: Modes, excitation: Excitation | PiecewiseForce) -> Respo
 
     Args:
         modes: the system.
-        excitation: the blows; of a `PiecewiseForce`, one period.
+        excitation: the blows, if not given 300 N, 4 ms wide, one every 40 ms; of a
+            `PiecewiseForce`, one period.
 
     Returns:
         the response over one period.
@@ -426,14 +439,17 @@ def steady_state(modes: Modes, excitation: Excitation | PiecewiseForce) -> Respo
 
 
 def response_from_rest(
-    modes: Modes, excitation: Excitation | PiecewiseForce, hits: int | None = None
+    modes: Modes,
+    excitation: Excitation | PiecewiseForce = USUAL_BLOWS,
+    hits: int | None = None,
 ) -> Response:
     """The exact response to a burst from rest, ring-down included.
 
     Args:
         modes: the system.
-        excitation: the blows, or a force history (whose last piece may be endless).
-        hits: how many blows, for an `Excitation`.
+        excitation: the blows, as in `steady_state`, or a force history (whose last piece may be
+            endless).
+        hits: how many blows, for an `Excitation`; 12, as of a rivet, where no blows are given.
 
     Returns:
         the response from the first blow on.
@@ -442,6 +458,8 @@ def response_from_rest(
         InputError: hits below 1, or none given for an excitation.
     """
     if isinstance(excitation, Excitation):
+        if hits is None and excitation is USUAL_BLOWS:
+            hits = USUAL_HITS
         if hits is None:
             raise InputError("give the number of hits of the burst", key="hits")
         force = excitation.burst(hits)

@@ -8,15 +8,15 @@ from dataclasses import replace
 from html import escape
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
+
+from matplotlib.axes import Axes
 
 from picchio.core.errors import InputError
 from picchio.core.provenance import provenance
 from picchio.core.results import Result
-from picchio.model.model import Model
-from picchio.robot.flexible_robot import FlexibleRobot
-from picchio.robot.loading.load import load_robot
-from picchio.studies.default_task import task_of
+from picchio.model.model import Model, ModelLike
+from picchio.studies.default_task import TaskLike, task_of
 from picchio.studies.instant import Place
 from picchio.studies.tasks import Task
 from picchio.visuals.live.page import live_html
@@ -33,6 +33,9 @@ class Explorer(Result):
         url: of the page.
         session: where the arm stands now, and what that does to it.
     """
+
+    PLOTS: ClassVar = {"robot": "visuals.live.explore:plot_explored"}
+    LACKS: ClassVar = {"to_frame": "its values change: see `to_dict`"}
 
     def __init__(self, session: Session) -> None:
         self.session = session
@@ -53,6 +56,10 @@ class Explorer(Result):
     def close(self) -> None:
         """End it; the page says that it has ended."""
         self._server.stop()
+
+    def show(self, **_: Any) -> Explorer:
+        """Itself: in a notebook the cell shows it."""
+        return self
 
     def _headline(self) -> str:
         pose = ", ".join(f"{q:.4g}" for q in self.session.place.pose)
@@ -90,9 +97,7 @@ class Explorer(Result):
 
     def _picture(self) -> str:
         """The robot and the force where they stand now, as a PNG's data URL."""
-        place = self.session.place
-        axes = blank_figure(4.0, 3.2)
-        plot_pose(self.session.robot, place.pose, [Arrow(place.direction, "", "comes", BLUE)], axes)
+        axes = plot_explored(self, blank_figure(4.0, 3.2))
         stream = BytesIO()
         figure = axes.get_figure(root=True)
         assert figure is not None
@@ -100,11 +105,23 @@ class Explorer(Result):
         return f"data:image/png;base64,{b64encode(stream.getvalue()).decode('ascii')}"
 
 
+def plot_explored(found: Explorer, ax: Axes | None = None) -> Axes:
+    """The robot and the force where they stand now.
+
+    Args:
+        found: the explorer.
+        ax: where to draw.
+    """
+    place = found.session.place
+    force = Arrow(place.direction, "", "comes", BLUE)
+    return plot_pose(found.session.robot, place.pose, [force], ax)
+
+
 def explore(
-    robot: str | Path | FlexibleRobot | Model,
+    robot: ModelLike,
     *,
-    task: str | Path | Task | None = None,
-    model: str | Path | Model | None = None,
+    task: TaskLike = None,
+    model: ModelLike | None = None,
     flex: str | Path | None = None,
     tool: str | None = None,
     save: str | Path | None = None,
@@ -129,8 +146,7 @@ def explore(
     Raises:
         InputError: a file that cannot be read, no flexible joint, a model of another robot.
     """
-    found = robot if isinstance(robot, Model) else load_robot(robot, flex=flex, tool=tool)
-    models = _models(Model.of(found), model)
+    models = _models(Model.of(robot, flex=flex, tool=tool), model)
     arm = models["nominal"].robot
     first = task_of(arm, task).operations[0]
     place = Place(first.poses[0], first.direction, first.excitation, first.hits_per_rivet)
@@ -138,13 +154,13 @@ def explore(
     return Explorer(Session(models, place, file))
 
 
-def _models(given: Model, extended: str | Path | Model | None) -> dict[str, Model]:
+def _models(given: Model, extended: ModelLike | None) -> dict[str, Model]:
     """The nominal model, and the extended one where there is one."""
     bare = replace(given.robot, effect_tables=())
     nominal = Model(bare, given.gravity_stiffness, given.gravity_balanced)
     if extended is None:
         return {"nominal": nominal} | ({"extended": given} if given.effects else {})
-    other = extended if isinstance(extended, Model) else Model.of(load_robot(extended))
+    other = Model.of(extended)
     if other.robot.joint_names != bare.joint_names or (
         other.robot.flexible_names != bare.flexible_names
     ):

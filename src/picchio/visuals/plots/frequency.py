@@ -57,7 +57,7 @@ def plot_mode_shapes(modes: Modes, ax: Axes | None = None) -> Axes:
 @styled
 def plot_frequency_response(
     modes: Modes,
-    direction: ArrayLike,
+    direction: ArrayLike = (0.0, 0.0, 1.0),
     ax: Axes | None = None,
     *,
     excitation: Excitation | None = None,
@@ -66,7 +66,7 @@ def plot_frequency_response(
 
     Args:
         modes: of the robot at a pose.
-        direction: (3,) of the force.
+        direction: (3,) of the force; upwards if not given.
         ax: where to draw.
         excitation: blows whose harmonics to mark.
     """

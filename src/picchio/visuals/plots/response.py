@@ -33,7 +33,7 @@ def response_times(
 @styled
 def plot_response(
     response: Response | SampledResponse,
-    direction: ArrayLike,
+    direction: ArrayLike | None = None,
     ax: Axes | None = None,
     *,
     joints: Sequence[str] | None = None,
@@ -44,7 +44,7 @@ def plot_response(
 
     Args:
         response: from rest (the first part of its ring-down is shown), or steady (two periods).
-        direction: (3,) of the force.
+        direction: (3,) of the force; the worst of all joints if not given.
         ax: where to draw.
         joints: names; all if not given.
         steady: a steady state to show beside a response from rest, as its band.
@@ -54,6 +54,12 @@ def plot_response(
         InputError: an unknown joint.
     """
     ax = axes_or_new(ax)
+    if direction is None:
+        if not isinstance(response, Response):
+            raise InputError(
+                "is needed: the response is known along one direction alone", key="direction"
+            )
+        direction = max(response.worst_directions(), key=lambda worst: worst.value).direction
     names = response.modes.output_names
     chosen = list(names if joints is None else joints)
     for name in chosen:

@@ -7,7 +7,9 @@ from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
 from picchio.fatigue.counting.cycles import Cycles
+from picchio.visuals.plots.response import response_times
 from picchio.visuals.plots.style import BLUE, MUTED, VERMILION, axes_or_new, note, plain, styled
+from picchio.visuals.worst_rivet import WorstRivet
 
 
 @styled
@@ -62,6 +64,34 @@ def plot_stress_history(
     ax.margins(y=0.12)
     ax.legend(loc="upper right", ncols=3)
     return ax
+
+
+def plot_rivet_stress(
+    worst: WorstRivet, ax: Axes | None = None, *, allowable: float | None = None
+) -> Axes:
+    """The shear stress in a joint's shaft over its worst rivet; see `plot_stress_history`.
+
+    Args:
+        worst: the rivet.
+        ax: where to draw.
+        allowable: Pa, amplitude.
+
+    Raises:
+        InputError: the joint has no shaft.
+    """
+    response, force = worst.response, worst.response.force
+    end = 2.0 * force.end if response.periodic else 2.6 * float(force.start[-1])
+    time = response_times(response, end)
+    turning = worst.stress_turning_points()
+    return plot_stress_history(
+        time,
+        worst.stress(time),
+        ax,
+        turning_points=turning,
+        joint=worst.joint.name,
+        static=worst.stress_of(worst.static_torque),
+        allowable=allowable,
+    )
 
 
 @styled

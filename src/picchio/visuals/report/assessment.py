@@ -12,7 +12,7 @@ from picchio.core.arrays import FloatArray
 from picchio.fatigue.shaft_stress import shear_stress
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.fatigue.sn.library import load_sn_curve
-from picchio.model.model import Model
+from picchio.model.model import ModelLike
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.assessment.backwards import Allowable, AllowableLoads
 from picchio.studies.assessment.method_comparison import Term
@@ -32,7 +32,7 @@ from picchio.visuals.plots.life import (
 from picchio.visuals.plots.polar import plot_polar_envelope
 from picchio.visuals.plots.response import plot_response, response_times
 from picchio.visuals.plots.sn import plot_sn_curve
-from picchio.visuals.plots.stress import plot_counted_cycles, plot_stress_history
+from picchio.visuals.plots.stress import plot_counted_cycles, plot_rivet_stress
 from picchio.visuals.plots.style import blank_figure
 from picchio.visuals.report.cover import Cover
 from picchio.visuals.report.page import Picture, inline_svg, render
@@ -108,18 +108,7 @@ def _figures(
             f"S-N curve {curve.name} with the largest amplitude of every pose, a symbol a joint",
             "Each symbol is one pose of the task at its largest equivalent amplitude; at the "
             "right edge it could go on for ever.", main=True)  # fmt: skip
-        response = worst.response
-        force = response.force
-        end = 2 * force.end if response.periodic else 2.6 * float(force.start[-1])
-        time = response_times(response, end)
-        history = shear_stress(
-            worst.stiffness * response.deflection(time, operation.direction)[worst.index],
-            joint.shaft,
-        )
-        add(plot_stress_history(time, history, blank_figure(height=2.7),
-                                turning_points=worst.stress_turning_points(), joint=joint.name,
-                                static=float(shear_stress(worst.static_torque, joint.shaft)),
-                                allowable=curve.allowable),
+        add(plot_rivet_stress(worst, blank_figure(height=2.7), allowable=curve.allowable),
             f"Shear stress in the shaft of {joint.name} over its worst rivet",
             f"What rainflow counts: the turning points of the stress ({where}).")  # fmt: skip
         add(plot_counted_cycles(worst.cycles(), blank_figure(height=2.7),
@@ -209,7 +198,7 @@ def _ranking(assessment: Assessment) -> str:
 
 def assessment_report(
     assessment: Assessment,
-    robot: FlexibleRobot | Model,
+    robot: ModelLike,
     task: Task,
     *,
     warnings: Sequence[str] = (),

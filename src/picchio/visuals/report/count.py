@@ -9,7 +9,7 @@ import numpy as np
 
 from picchio.core import spoken
 from picchio.ledger.result import Count
-from picchio.visuals.plots.style import blank_figure, look, styled
+from picchio.visuals.plots.style import axes_or_new, blank_figure, look, styled
 from picchio.visuals.report.page import Picture, Pictures, render
 
 if TYPE_CHECKING:
@@ -77,20 +77,21 @@ def _pictures(found: Count) -> list[Picture]:
         return []
     made = Pictures()
     return [
-        made.picture(plot_life_used(found), "Life used over time",
+        made.picture(plot_life_used(found, blank_figure()), "Life used over time",
                      "Share of each joint's life that is used (Miner's sum)."),
-        made.picture(plot_blows(found), "Blows a day", "Blows on each day."),
+        made.picture(plot_blows(found, blank_figure()), "Blows a day", "Blows on each day."),
     ]  # fmt: skip
 
 
 @styled
-def plot_life_used(found: Count) -> Axes:
+def plot_life_used(found: Count, ax: Axes | None = None) -> Axes:
     """The damage of each joint over time.
 
     Args:
         found: the count.
+        ax: where to draw.
     """
-    axes = blank_figure()
+    axes = axes_or_new(ax)
     parts = found.counted.stretches
     when = np.array([part.last for part in parts]).astype("datetime64[ns]")
     done = np.array([part.damage for part in parts]) * found.counted.together
@@ -107,13 +108,14 @@ def plot_life_used(found: Count) -> Axes:
 
 
 @styled
-def plot_blows(found: Count) -> Axes:
+def plot_blows(found: Count, ax: Axes | None = None) -> Axes:
     """The blows on each day.
 
     Args:
         found: the count.
+        ax: where to draw.
     """
-    axes = blank_figure()
+    axes = axes_or_new(ax)
     days = found.days()
     dates = np.array([day["date"] for day in days], dtype="datetime64[D]")
     axes.bar(dates, [day["blows"] for day in days], width=0.8)

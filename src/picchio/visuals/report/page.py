@@ -7,10 +7,9 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from importlib.resources import files
 from inspect import signature
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 import matplotlib as mpl
 from markupsafe import Markup, escape
@@ -18,9 +17,10 @@ from matplotlib.axes import Axes
 
 from picchio.core import spoken
 from picchio.core.errors import InputError
-from picchio.core.html import Page, unfolded
+from picchio.core.html import Page
 from picchio.core.provenance import package_version
 from picchio.core.results import Result
+from picchio.core.shown import named_function
 from picchio.visuals.plots.style import BLUE, INK, MUTED, STYLE, VERMILION
 
 if TYPE_CHECKING:
@@ -192,6 +192,8 @@ class Report(Page):
         text: the HTML.
     """
 
+    LACKS: ClassVar = dict.fromkeys(("plot", "show", "to_frame"), "it is a page: save it")
+
     title: str
     text: str
 
@@ -231,8 +233,7 @@ def report(
     if not isinstance(result, Result):
         raise InputError("is no result of picchio", key="result", value=result)
     title = result._headline()
-    module, _, name = result.PAGE.partition(":")
-    page = getattr(import_module(f"picchio.{module}"), name)
+    page = named_function(result.PAGE)
     try:
         asked = signature(page).bind(result, command=command, warnings=warnings, **options)
     except TypeError as error:
@@ -248,7 +249,7 @@ def plain_page(
         "plain.html.j2",
         **shown,
         headline=result._headline(),
-        body=Markup(unfolded(result._repr_html_())),
+        body=Markup(result._repr_html_()),
         command=command,
         warnings=warnings,
         provenance=result.to_dict().get("provenance"),

@@ -6,9 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from picchio.campaign.channels import Channel
 from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.criteria.equivalence import bic
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord
 from picchio.diagnosis.percussion.diagnosis import PercussionDiagnosis
@@ -20,10 +22,12 @@ from picchio.diagnosis.percussion.residual import (
     restoring,
     transfers,
 )
+from picchio.diagnosis.result import Diagnosis
 from picchio.prediction.residual import together
 from picchio.visuals.plots.diagnosis import (
     plot_bands,
     plot_left_over,
+    plot_motion_scores,
     plot_overlay,
     plot_place,
     plot_scores,
@@ -46,6 +50,37 @@ _PERIODS = 10.0
 _FEWEST_SECONDS = 0.15
 # Candidates that a picture of a step shows; a wider search fits many more.
 _SHOWN = 12
+
+
+def plot_candidates(found: Diagnosis, ax: Axes | None = None, *, step: int = 1) -> Axes:
+    """What each candidate of a step of the search leaves, or takes of what is left.
+
+    Args:
+        found: the diagnosis.
+        ax: where to draw.
+        step: of the search, from 1.
+
+    Raises:
+        InputError: no such step.
+    """
+    rows = [row for row in found.scores if row["step"] == step]
+    if not rows:
+        raise InputError(
+            "no such step of the search",
+            key="step",
+            value=step,
+            choices=sorted({row["step"] for row in found.scores}),
+        )
+    stand = [(cause.effect, cause.target) for cause in found.causes]
+    if "bic" not in rows[0]:
+        return plot_motion_scores(rows[:_SHOWN], ax, chosen=stand)
+    return plot_scores(rows[:_SHOWN], _without(found.details["percussion"]), ax, chosen=stand)
+
+
+def _without(found: PercussionDiagnosis) -> tuple[float, float]:
+    """BIC and chi-square per sample with no cause."""
+    start = found.search.baseline
+    return bic(start), start.chi_square / max(start.samples, 1)
 
 
 @dataclass(frozen=True)
@@ -222,8 +257,7 @@ class PercussionFigures(_Percussion):
     def scores(self) -> list[Picture]:
         """The candidates, a picture a step of the search."""
         rows = list(self.found.diagnosis.scores)
-        start = self.found.search.baseline
-        without = (bic(start), start.chi_square / max(start.samples, 1))
+        without = _without(self.found)
         stand = tuple(tuple(x.split(":", 1)) for x in self.found.extended.hypothesis.labels)
         made = []
         for step in sorted({row["step"] for row in rows}):

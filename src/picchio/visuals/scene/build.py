@@ -13,9 +13,8 @@ from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.diagnosis.result import Diagnosis
 from picchio.excitation.excitation import Excitation
-from picchio.model.model import Model
+from picchio.model.model import Model, ModelLike
 from picchio.robot.annotations.flexibility import estimate_notice
-from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.assessment.result import Assessment
 from picchio.studies.envelopes import DirectionEnvelope, icosphere
 from picchio.studies.envelopes import envelope as envelope_of
@@ -44,7 +43,7 @@ _SHELL = 2  # subdivisions of the net about what is estimated
 
 
 def build_scene(
-    robot: FlexibleRobot | Model,
+    robot: ModelLike,
     pose: ArrayLike | Mapping[str, float],
     excitation: Excitation,
     *,

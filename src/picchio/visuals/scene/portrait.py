@@ -158,6 +158,20 @@ def plot_pose(
     return axes
 
 
+def plot_standing(
+    robot: FlexibleRobot, ax: Axes | None = None, *, pose: ArrayLike | str | None = None
+) -> Axes:
+    """The robot at a pose.
+
+    Args:
+        robot: the robot; its meshes are read.
+        ax: where to draw.
+        pose: (nv,) rad or m, or a name; zeros, or what is nearest within the limits, if not given.
+    """
+    rest = np.clip(np.zeros(len(robot.joint_names)), robot.lower, robot.upper)
+    return plot_pose(robot, robot.pose(rest if pose is None else pose), (), ax)
+
+
 @styled
 def plot_mode(
     robot: FlexibleRobot, pose: ArrayLike, shape: FloatArray, ax: Axes | None = None

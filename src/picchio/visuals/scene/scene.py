@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -14,10 +14,14 @@ from picchio.core.processes import safe_start
 from picchio.core.results import Result
 from picchio.studies.envelopes import DirectionEnvelope
 from picchio.visuals.kinematics import Frame
+from picchio.visuals.notebook import in_notebook
 from picchio.visuals.scene.live import send
 from picchio.visuals.scene.overlay import Scale
 from picchio.visuals.scene.page import scene_html
 from picchio.visuals.scene.robot.mesh import Mesh
+
+if TYPE_CHECKING:
+    import pandas
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +71,8 @@ class Scene(Page, Result):
         file: where it was saved last, or None.
     """
 
+    LACKS: ClassVar = {"plot": "it has three dimensions: `show` it"}
+
     title: str
     subtitle: str
     envelope: DirectionEnvelope
@@ -94,15 +100,18 @@ class Scene(Page, Result):
         """One HTML page that needs nothing but itself."""
         return scene_html(self)
 
-    def show(self, viewer: Any = None) -> Any:
-        """Draw it in a live meshcat viewer.
+    def show(self, viewer: Any = None, **_: Any) -> Any:
+        """In a notebook the scene itself, which the cell shows; else a live meshcat viewer.
 
         Args:
-            viewer: a new one if not given.
+            viewer: of meshcat, to draw in; a new one if not given.
+            **_: nothing: it is drawn already.
 
         Returns:
-            the viewer.
+            the scene or the viewer.
         """
+        if viewer is None and in_notebook():
+            return self
         if viewer is None:
             import meshcat
 
@@ -121,6 +130,10 @@ class Scene(Page, Result):
         """
         self.file = super().save(path)
         return self.file
+
+    def to_frame(self) -> pandas.DataFrame:
+        """The table of its envelope."""
+        return self.envelope.to_frame()
 
     def _headline(self) -> str:
         return f"{self.title}, {self.subtitle}"
