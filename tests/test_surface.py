@@ -80,6 +80,7 @@ def modules() -> list[str]:
 def test_dir_shows_the_functions_the_loaders_and_what_the_guides_use(repository: Path) -> None:
     guides = [repository / "README.md", *(repository / "docs").glob("*/*.md")]
     guides += (repository / "docs" / "gallery").glob("*.py")
+    guides += (repository / "notebooks").glob("*.ipynb")
     shown = {
         name for path in guides
         for name in re.findall(r"\bpicchio\.([A-Za-z]\w*)", path.read_text())

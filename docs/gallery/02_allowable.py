@@ -8,11 +8,9 @@ import pandas as pd
 
 import picchio
 
-robot = picchio.load_robot("fanuc_like_3dof")
-task = picchio.load_task(robot.task_path, robot)
 force = {}
 for rivets in (1e4, 1e6, 1e8):
-    found = picchio.allowable(robot, task, rivets=rivets, survival=0.99).to_frame()
+    found = picchio.allowable("fanuc_like_3dof", rivets=rivets, survival=0.99).to_frame()
     force[f"{rivets:.0e} rivets"] = 300 * found["force_factor"]  # the task has 300 N
 pd.DataFrame(force).plot.bar(rot=0, ylabel="allowable force, N")
 plt.show()

@@ -8,9 +8,8 @@ import numpy as np
 
 import picchio
 
-robot = picchio.load_robot("fanuc_like_3dof")
 blows = picchio.PulseTrain(force=300.0, period=0.040, width=0.004)
-modes = picchio.modal_analysis(picchio.Model(robot).linear_system([0.3, 1.1, -1.0]))
+modes = picchio.modal_analysis("fanuc_like_3dof", [0.3, 1.1, -1.0])
 time = np.linspace(0.0, 4.0, 8000)
 real = picchio.response_from_rest(modes, blows, hits=100).deflection(time, [0, 0, 1])[1]
 steady = picchio.steady_state(modes, blows).deflection(time % blows.period, [0, 0, 1])[1]

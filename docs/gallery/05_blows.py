@@ -8,8 +8,7 @@ import numpy as np
 
 import picchio
 
-robot = picchio.load_robot("fanuc_like_3dof")
-modes = picchio.modal_analysis(picchio.Model(robot).linear_system([0.3, 1.1, -1.0]))
+modes = picchio.modal_analysis("fanuc_like_3dof", [0.3, 1.1, -1.0])
 time = np.linspace(0.0, 0.3, 3000)
 for style, blows in {
     "-": picchio.PulseTrain(300.0, 0.040, 0.004),

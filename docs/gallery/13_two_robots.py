@@ -7,11 +7,7 @@ import matplotlib.pyplot as plt
 
 import picchio
 
-figure, axes = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
+figure, axes = plt.subplots(1, 2, figsize=(11, 4), layout="constrained")
 for name, ax in zip(("ur10", "panda"), axes, strict=True):
-    robot = picchio.load_robot(name)
-    life = picchio.assess(robot, picchio.load_task(robot.task_path, robot), uncertainty=False)
-    frame = life.to_frame()
-    ax.barh(frame.index, 100 * frame["utilisation"])
-    ax.set(title=name, xlabel="utilisation, %")
+    picchio.assess(name, uncertainty=False).plot(ax=ax).set_title(name)
 plt.show()

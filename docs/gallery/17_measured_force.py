@@ -11,10 +11,10 @@ import picchio
 time = np.arange(0.0, 0.05, 1e-4)
 read = np.where(time < 0.005, 800.0 * np.sin(np.pi * time / 0.005), 0.0)
 blow = picchio.MeasuredForce(time, read + np.random.default_rng(1).normal(0.0, 3.0, time.size))
-model = picchio.Model(picchio.load_robot("fanuc_like_3dof"))
+robot = picchio.load_robot("fanuc_like_3dof")
 at = np.linspace(0.0, 0.6, 3000)
 for name, pose in {"bent": [0.0, 1.1, -1.8], "stretched": [0.0, 0.3, -0.1]}.items():
-    modes = picchio.modal_analysis(model.linear_system(pose))
+    modes = picchio.modal_analysis(robot, pose)
     answer = picchio.response_from_rest(modes, blow, hits=1)
     plt.plot(at, 1e3 * answer.deflection(at, [0, 0, 1])[1], label=name)
 plt.xlabel("time, s")

@@ -17,6 +17,6 @@ robot = picchio.load_robot("fanuc_like_3dof")
 blows = {"kind": "pulse_train", "force": 5000.0, "period": 0.040, "width": 0.004}
 work = {"name": "up", "direction": [0, 0, 1], "poses": [[0.3, 1.1, -1.0]]}
 task = picchio.task_from_dict({"excitation": blows, "operation": [work]}, robot)
-found = picchio.count(robot, "monday.csv", "cell.ledger", task=task).to_frame()
-found["damage"].plot.bar(logy=True, rot=0, ylabel="damage of ten minutes (1: failure)")
+found = picchio.count(robot, "monday.csv", "cell.ledger", task=task)
+found.plot()
 plt.show()

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
@@ -15,11 +15,15 @@ from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.core.fitted import Fit, FittedValue
 from picchio.core.results import TableResult
+from picchio.core.shown import named_function
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.registry import effect_class
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.loading.saved_model import saved_model_text
+
+if TYPE_CHECKING:
+    from picchio.visuals.report.motion_figures import View
 
 # What percussion and motion records are judged by alike.
 
@@ -438,6 +442,14 @@ class Diagnosis(TableResult, Fit):
 
     def _rows(self) -> list[dict[str, Any]]:
         return [asdict(value) for value in self._fitted()]
+
+    def views(self, which: str = "train") -> list[View]:
+        """What is left of every torque and twist of motion records, before and after.
+
+        Args:
+            which: the records "train", which were fitted to, or those "held_out".
+        """
+        return named_function("visuals.report.motion_figures:views")(self, which)  # type: ignore[no-any-return]
 
     def _seen(self) -> Mapping[str, Any]:
         return {"robot": self.model.robot, "diagnosis": self} if self.model else {}

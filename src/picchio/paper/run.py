@@ -23,6 +23,7 @@ from picchio.paper.study import WORLDS, Study
 from picchio.paper.table2.answer import Answer, answer
 from picchio.paper.verdict import Verdict
 from picchio.paper.waterfall import Step, waterfall
+from picchio.paper.world import World
 
 FORMAT = "picchio-reproduction/1"
 
@@ -64,6 +65,14 @@ class Reproduction(TableResult):
     def counts(self) -> dict[str, int]:
         """How many claims got each verdict."""
         return {str(v): sum(tried.finding.verdict is v for tried in self.claims) for v in Verdict}
+
+    def world(self, **assume: float | str) -> World:
+        """The paper's figures in a world of other assumptions.
+
+        Args:
+            **assume: in place of picchio's own, such as `period=0.05`.
+        """
+        return World(Assumptions(**assume))  # type: ignore[arg-type]
 
     def _headline(self) -> str:
         counts = ", ".join(f"{n} {verdict}" for verdict, n in self.counts.items())

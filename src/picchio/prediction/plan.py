@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -21,6 +21,7 @@ from picchio.core.toml import (
     StrictModel,
     parse_toml,
     read_toml,
+    validate,
 )
 from picchio.excitation.piecewise import Hits
 from picchio.excitation.table import catalogue, excitation_class
@@ -279,15 +280,17 @@ class TestPlan(StrictModel):
     notes: str | None = None
 
 
-def read_plan(path: str | Path) -> Plan:
+def read_plan(path: str | Path | Mapping[str, Any]) -> Plan:
     """The plan of blows in a file.
 
     Args:
-        path: of the file.
+        path: of the file, or its keys and values; `format` may be left out.
 
     Raises:
         InputError: no such plan; one of tests that are done by hand.
     """
+    if isinstance(path, Mapping):
+        return validate({"format": FORMAT, **path}, Plan, format=FORMAT)
     if "test" in read_toml(path):
         raise InputError(
             "is a plan of tests for stiffness, which are done by hand", file=Path(path), key="test",

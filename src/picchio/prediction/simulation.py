@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -83,7 +83,7 @@ class Simulation(TableResult):
 @one_thread()
 def simulate(
     robot: RobotLike,
-    plan: str | Path | Plan,
+    plan: str | Path | Plan | Mapping[str, Any],
     to: str | Path | None = None,
     *,
     flex: str | Path | None = None,
@@ -101,7 +101,8 @@ def simulate(
     Args:
         robot: as `load_robot` takes it.
         plan: poses, directions, levels, blows, sample rate, and sensors with their noise
-            (`picchio-plan/1`); effects in it make the world differ from the model.
+            (`picchio-plan/1`), or a file's keys and values; effects in it make the world differ
+            from the model.
         to: the campaign's folder; None: the campaign stays in memory.
         flex: sidecar of the robot.
         tool: the frame that carries the tool.
@@ -120,7 +121,7 @@ def simulate(
         InputError: a robot or a plan that cannot be read or do not fit each other.
     """
     loaded = load_robot(robot, flex=flex, tool=tool)
-    file = None if isinstance(plan, Plan) else Path(plan)
+    file = Path(plan) if isinstance(plan, (str, Path)) else None
     asked = plan if isinstance(plan, Plan) else read_plan(plan)
     if seed is not None:
         asked = asked.model_copy(update={"seed": seed})

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -151,6 +151,15 @@ class Task(Shown):
                 for op in self.operations
             ]
         ).set_index("operation")
+
+    def with_blows(self, excitation: Excitation) -> Task:
+        """The same task with other blows in every operation.
+
+        Args:
+            excitation: the blows.
+        """
+        changed = tuple(replace(op, excitation=excitation) for op in self.operations)
+        return replace(self, operations=changed)
 
     @property
     def rivets_per_pass(self) -> float:

@@ -57,3 +57,6 @@ def from_dict(table: Mapping[str, Any], robot: FlexibleRobot) -> Effect:
     effect = effect_class(table["effect"])(table["target"], **table.get("parameters", {}))
     check_target(effect, robot)
     return effect.with_hidden(table.get("hidden", {}))
+
+
+effect_from_dict = from_dict  # its name in `picchio`
