@@ -328,6 +328,39 @@ def test_no_other_page_opens_the_socket(live_page: str, origin: str | None) -> N
     connection.close()
 
 
+def test_a_jupyterhub_leads_to_it_under_its_own_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import http.client
+
+    monkeypatch.setenv("JUPYTERHUB_SERVICE_PREFIX", "/user/ann/")
+    live = picchio.explore("fanuc_like_3dof", save=tmp_path / "x.toml")
+    try:
+        *_, host, word, _ = live.url.split("/")
+        port = host.split(":")[1]
+        assert f'data="/user/ann/proxy/{port}/{word}/"' in live._repr_html_()
+        asked = urllib.request.Request(live.url, headers={"Host": "hub.example"})
+        policy = urllib.request.urlopen(asked).headers["Content-Security-Policy"]
+        assert "wss://hub.example" in policy and "frame-ancestors 'self'" in policy
+        upgrade = {
+            "Upgrade": "websocket",
+            "Connection": "Upgrade",
+            "Sec-WebSocket-Version": "13",
+            "Sec-WebSocket-Key": "x3JJHMbDL1EzLkh9GBhXDw==",
+            "Host": "hub.example",
+        }
+        for origin, status in {
+            "https://hub.example": 101, "http://hub.example": 101, "https://evil.example": 403,
+            "https://hub.example.evil.example": 403, "null": 403,
+        }.items():  # fmt: skip
+            connection = http.client.HTTPConnection(host, timeout=10)
+            connection.request("GET", f"/{word}/live", headers=upgrade | {"Origin": origin})
+            assert connection.getresponse().status == status, origin
+            connection.close()
+    finally:
+        live.close()
+
+
 @pytest.fixture(scope="module")
 def live_page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     live = picchio.explore("fanuc_like_3dof", save=tmp_path_factory.mktemp("x") / "x.toml")

@@ -83,12 +83,13 @@ class Explorer(Result):
         # Where the page cannot be had (the kernel has ended, or runs elsewhere) a browser shows
         # what stands within the object instead: the robot as it stood, and why.
         self._server.framed = True
-        name, url = escape(self.session.robot.name), escape(self.url)
+        name, url = escape(self.session.robot.name), escape(self._server.address)
         return (
             f'<object title="{name}" type="text/html" data="{url}" '
             'style="display:block;width:100%;height:640px">'
             f'<p><strong>{name}</strong> is live at <a href="{url}">{url}</a> while its kernel '
-            "runs, in a browser on the kernel's machine. Run the cell again to explore it; "
+            "runs, in a browser on the kernel's machine, or on a JupyterHub that has "
+            "jupyter-server-proxy. Run the cell again to explore it; "
             "<code>picchio.view</code> makes a page that needs no kernel.</p>"
             f'<img src="{self._picture()}" style="max-width:100%" '
             f'alt="{name} at the pose explored; the arrow is the force">'
@@ -129,7 +130,8 @@ def explore(
     """Explore a robot by hand: drag its tool or turn its joints, and see its life change.
 
     A server on 127.0.0.1 shows the page and answers; nothing leaves this machine. In Jupyter the
-    cell shows it, as long as the kernel runs on the machine of the browser.
+    cell shows it, as long as the kernel runs on the machine of the browser; on a JupyterHub through
+    jupyter-server-proxy, which must be installed there.
 
     Args:
         robot: the robot, its name or file, or a model of it. The nominal model stands beside a

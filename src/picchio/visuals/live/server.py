@@ -2,12 +2,14 @@
 
 It listens on 127.0.0.1 and a port that the system chooses; the address has a random word in it,
 and what does not come from that page is refused, so that no other page of the browser can ask.
+On a JupyterHub the browser is elsewhere: jupyter-server-proxy leads there, under the hub's name.
 """
 
 from __future__ import annotations
 
 import asyncio
 import json
+import os
 import re
 import secrets
 import threading
@@ -46,6 +48,7 @@ class Server:
         self._asked = asyncio.Event()
         self._gestures: list[Gesture] = []
         self._ball: tuple[int, Iterator[dict[str, Any] | None]] | None = None
+        self.hub = os.environ.get("JUPYTERHUB_SERVICE_PREFIX", "").rstrip("/")
         self.port = 0
         self.framed = False  # whether a notebook shows it
         self._ready = threading.Event()
@@ -56,6 +59,11 @@ class Server:
     def url(self) -> str:
         """Where the page is."""
         return f"http://127.0.0.1:{self.port}/{self._word}/"
+
+    @property
+    def address(self) -> str:
+        """Where a browser finds it: its url, or its path on the hub."""
+        return f"{self.hub}/proxy/{self.port}/{self._word}/" if self.hub else self.url
 
     @property
     def alive(self) -> bool:
@@ -205,12 +213,12 @@ class Server:
                 self._sockets.discard(socket)
 
     def own(self, host: str) -> bool:
-        """Whether a request names this server, and no name that leads here.
+        """Whether a request names this server, and no name that leads here but a hub's.
 
         Args:
             host: as the request says it.
         """
-        return host in (f"127.0.0.1:{self.port}", f"localhost:{self.port}")
+        return bool(self.hub) or host in (f"127.0.0.1:{self.port}", f"localhost:{self.port}")
 
 
 class _Page(RequestHandler):
@@ -222,10 +230,12 @@ class _Page(RequestHandler):
             raise HTTPError(403)
         where = self.request.host
         # A notebook that shows it is a page of this machine; else nobody frames it.
-        frames = _NOTEBOOKS if self._server.framed else "'none'"
+        notebooks = "'self'" if self._server.hub else _NOTEBOOKS
+        frames = notebooks if self._server.framed else "'none'"
+        sockets = f"wss://{where} ws://{where}" if self._server.hub else f"ws://{where}"
         self.set_header(
             "Content-Security-Policy",
-            f"{POLICY}; connect-src ws://{where}; frame-ancestors {frames}",
+            f"{POLICY}; connect-src {sockets}; frame-ancestors {frames}",
         )
         if not self._server.framed:
             self.set_header("X-Frame-Options", "DENY")
@@ -240,7 +250,8 @@ class _Socket(WebSocketHandler):
         self._server = server
 
     def check_origin(self, origin: str) -> bool:
-        return origin == f"http://{self.request.host}"
+        ways = ("http", "https") if self._server.hub else ("http",)
+        return origin in [f"{way}://{self.request.host}" for way in ways]
 
     def prepare(self) -> None:
         # Tornado asks `check_origin` only where there is an origin.

@@ -49,7 +49,7 @@ function take(values) {
 }
 
 function connect() {
-  socket = new WebSocket(`ws://${location.host}${location.pathname}live`);
+  socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}${location.pathname}live`);
   socket.onmessage = heard;
   socket.onclose = () => say("picchio has ended: start picchio explore again", true);
 }
