@@ -15,7 +15,6 @@ from __future__ import annotations
 import inspect
 import itertools
 import json
-import typing
 import warnings
 import zlib
 
@@ -104,15 +103,10 @@ def studies() -> list[str]:
         if not inspect.isfunction(function):
             continue
         first = next(iter(inspect.signature(function).parameters), None)
-        if first == "robot" and Model in typing.get_args(_hints(function)["robot"]):
+        known = function.__annotations__
+        if first == "robot" and known["robot"] == "ModelLike" and "tuple" not in known["return"]:
             found.append(name)
     return found
-
-
-def _hints(function) -> dict[str, object]:
-    module = inspect.getmodule(function)
-    annotation = function.__annotations__["robot"]
-    return {"robot": eval(annotation, vars(module)) if isinstance(annotation, str) else annotation}
 
 
 def ask(study: str, model: Model, excitation: Excitation, folder) -> dict[str, float | str]:

@@ -28,7 +28,7 @@ def handle(monkeypatch: pytest.MonkeyPatch) -> Handle:
         return found
 
     monkeypatch.setattr(display, "display", show)
-    monkeypatch.setattr(notebook, "_in_notebook", lambda: True)
+    monkeypatch.setattr(notebook, "in_notebook", lambda: True)
     return found
 
 
@@ -54,7 +54,7 @@ def test_quick_work_shows_none(handle) -> None:
 
 
 def test_a_script_shows_none(capsys: pytest.CaptureFixture[str]) -> None:
-    assert not notebook._in_notebook()
+    assert not notebook.in_notebook()
     with notebook.progress("poses") as report:
         report(1, 2)
     said = capsys.readouterr()
