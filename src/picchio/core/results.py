@@ -131,7 +131,7 @@ class TableResult(Result):
         """The same table, with each variable's unit in its `attrs["units"]`."""
         frame = self.to_frame()
         found = frame.to_xarray()
-        for column, unit in frame.attrs["units"].items():
+        for column, unit in frame.attrs.get("units", {}).items():
             found[column].attrs["units"] = unit
         return found
 
