@@ -20,7 +20,7 @@ from picchio.core import spoken
 from picchio.core.arrays import FloatArray, IndexArray
 from picchio.core.errors import InputError
 from picchio.core.processes import one_thread
-from picchio.core.results import Result
+from picchio.core.results import TableResult
 from picchio.core.units import conversion
 from picchio.ledger.blows import runs
 from picchio.ledger.finding import SHARE
@@ -188,7 +188,7 @@ class Vibration:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class FirstLook(Result):
+class FirstLook(TableResult):
     """What a file seems to be, and what its accelerometer shows.
 
     Attributes:
@@ -198,6 +198,8 @@ class FirstLook(Result):
     """
 
     PAGE: ClassVar[str] = "visuals.report.first_look:first_look_page"
+    LACKS: ClassVar = {"plot": "`picchio.report` draws it", "show": "no robot is named yet"}
+    INDEX = ""
 
     detection: Detection
     vibration: Vibration | None
@@ -224,6 +226,9 @@ class FirstLook(Result):
 
     def _content(self) -> dict[str, Any]:
         return {**self.detection._content(), "vibration": self.vibration}
+
+    def _rows(self) -> list[dict[str, Any]]:
+        return [vars(ring) for ring in (self.vibration.ringing if self.vibration else ())]
 
     def _repr_html_(self) -> str:
         from picchio.core.html import sheet
