@@ -102,6 +102,21 @@ def test_units_of_frequency_response_functions(unit, factor):
                       "m/N" if unit == "µm/N" else "m/s^2/N")  # fmt: skip
 
 
+@pytest.mark.parametrize(
+    ("unit", "targets", "factor"),
+    [
+        ("%", ("1",), 0.01),
+        ("percent", ("1",), 0.01),
+        ("1/min", ("rad/s", "m/s"), 2.0 * np.pi / 60.0),
+        ("min⁻¹", ("rad/s",), 2.0 * np.pi / 60.0),
+        ("1/min", ("Hz",), 1.0 / 60.0),
+    ],
+)
+def test_shares_and_turns_a_minute(unit, targets, factor):
+    target, convert = conversion(unit, targets)
+    assert (target, convert.scale) == (targets[0], pytest.approx(factor, rel=1e-12))
+
+
 def test_temperatures_have_their_own_zero():
     for unit, value in (("K", 293.15), ("degF", 68.0), ("°C", 20.0)):
         _, convert = parse_header(f"temperature.j [{unit}]")
@@ -113,7 +128,7 @@ def test_temperatures_have_their_own_zero():
     [
         ("force [mm]", ["force", "'mm'", "N"]),
         ("force [g]", ["force", "'g'"]),
-        ("deflection.j [%]", ["deflection.j", "not a unit"]),
+        ("deflection.j [%]", ["deflection.j", "multiple of rad"]),
         ("deflection.j [1]", ["not a unit"]),
         ("velocity.j [Hz]", ["rad/s", "'Hz'"]),
         ("torque.j [N*m/rad]", ["torque.j"]),

@@ -64,6 +64,7 @@ turn = 6.283185307179586 * radian = rev = turns = revolution = revolutions
 arcminute = 0.0002908882086657216 * radian = arcmin
 arcsecond = 4.84813681109536e-06 * radian = arcsec
 rpm = turn / minute = RPM
+percent = 0.01 = percents
 kelvin = [temperature]; offset: 0 = K
 degree_Celsius = kelvin; offset: 273.15 = degC = degreeC = celsius
 degree_Fahrenheit = 5 / 9 * kelvin; offset: 255.37222222222223 = degF = degreeF = fahrenheit
@@ -82,13 +83,14 @@ _EXAMPLES = (
 # standard gravity, not a gram; in a torque lb is a force.
 _ALSO = {"gram": "standard_gravity", "pound": "pound_force", "ounce": "ounce_force"}
 _SIGNS = str.maketrans({"·": "*", "⋅": "*", "∙": "*", "•": "*", "×": "*", "−": "-", "º": "°",
-                        "[": "(", "]": ")", "\ufffd": "^2"})  # fmt: skip
+                        "[": "(", "]": ")", "\ufffd": "^2", "%": "percent"})  # fmt: skip
 """The last is what a reader of UTF-8 makes of the ² of an older code page."""
 _LONGEST = 40  # characters of a unit
 _MOST = 64  # readings of one that are tried
 # Names, products, quotients and one-digit powers: pint would also compute 9**9**9.
 _UNIT_LIKE = re.compile(r"[\s(]*(1\s*/)?[\s(]*[^\W\d_][\w°*/^()\s-]*|[\s(]*°[\w°*/^()\s-]*")
 _TOWER = re.compile(r"\d\d|\^[^\d(-]|\^\(?-?\d\)?\s*\^")
+_TURNS = re.compile(r"1\s*/\s*min|min\^-1", re.I)
 _SYMBOL = re.compile(r"[^\W\d_][^\W\d]*")
 
 
@@ -161,15 +163,21 @@ def _replaced(text: str, by: dict[str, str]) -> str:
     return _SYMBOL.sub(lambda found: by[found[0]], text)
 
 
+def _target(text: str) -> Any:
+    """The pint unit of an SI unit; a pure number's for "1"."""
+    return _parse("dimensionless" if text == "1" else _spelt(text))
+
+
 @cache
 def _meant(unit: str, targets: tuple[str, ...]) -> set[tuple[str, Conversion]]:
     """What a unit may mean where one of the targets is asked for; none where it is none of them."""
     text = _spelt(unit)
     if len(text) > _LONGEST:
         return set()
-    for readings in ([text], _readings(text, False), _readings(text, True)):
+    turns = [_TURNS.sub("rpm", text)]  # what drives' speeds in 1/min count
+    for readings in ([text], _readings(text, False), _readings(text, True), turns):
         pairs = itertools.product(targets, map(_parse, readings))
-        if found := {(t, c) for t, one in pairs if (c := _conversion(one, _parse(_spelt(t))))}:
+        if found := {(t, c) for t, one in pairs if (c := _conversion(one, _target(t)))}:
             return found
     return set()
 
