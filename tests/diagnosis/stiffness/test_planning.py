@@ -17,10 +17,11 @@ from picchio.campaign.tables import Tolerance
 from picchio.diagnosis.planning.choose import Space, choose
 from picchio.diagnosis.planning.kind import Offered, Possible
 from picchio.diagnosis.planning.outcome import Life, Outcome, outcome_of
+from picchio.diagnosis.planning.plan import _poses
 from picchio.diagnosis.planning.static import StaticTest
 from picchio.model.effects.registry import effect_class
 from picchio.robot.loading.saved_model import saved_model_text
-from picchio.studies.default_task import possible_poses
+from picchio.studies.default_task import possible_poses, task_of
 
 ARM = "fanuc_like_3dof"
 
@@ -141,6 +142,16 @@ def test_poses_are_possible_ones():
         assert not any(robot.limit_violations(pose) for pose in poses)
         low = min(robot.tool_position(pose)[2] for pose in poses)
         assert low > robot.mounting.xyz[2]
+
+
+@pytest.mark.parametrize("name", ["fanuc_like_3dof", "ur10", "abb_irb2600"])
+def test_a_person_reaches_the_tool(name):
+    robot = picchio.load_robot(name)
+    poses, notes = _poses(robot, task_of(robot, None), seed=3)
+    heights = [robot.frame_placement(pose, robot.tool_frame)[0][2] for pose in poses]
+    assert len(poses) > 5
+    assert min(heights) >= 0.2 and max(heights) <= 2.0
+    assert not any("above" in note for note in notes)
 
 
 def test_it_ends_where_nothing_is_left_to_know(tmp_path):

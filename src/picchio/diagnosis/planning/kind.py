@@ -8,10 +8,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
 from picchio.campaign.tables import Tolerance
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.planning.outcome import Outcome
 from picchio.robot.flexible_robot import FlexibleRobot
+
+REACH = (0.2, 2.0)
+"""m above the floor, z = 0: where a person who stands beside it sets up a gauge, or strikes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,6 +145,20 @@ def angles(robot: FlexibleRobot, pose: FloatArray) -> dict[str, tuple[float, str
         scale, unit = told_in(robot, name)
         found[name] = (round(float(value) * scale, 4) + 0.0, unit)
     return found
+
+
+def within_reach(robot: FlexibleRobot, pose: FloatArray, frame: str | None = None) -> bool:
+    """Whether a person can set up a gauge, or strike, at a frame: 0.2 to 2 m above the floor.
+
+    Args:
+        robot: at its mounting.
+        pose: (nv,) rad or m.
+        frame: the tool's where None.
+    """
+    down = np.array(robot.mounting.gravity, dtype=float)
+    place = robot.frame_placement(pose, frame or robot.tool_frame)[0]
+    low, high = REACH
+    return bool(low <= -place @ down / np.linalg.norm(down) <= high)
 
 
 def told_in(robot: FlexibleRobot, joint: str) -> tuple[float, str]:

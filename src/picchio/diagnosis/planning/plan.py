@@ -27,7 +27,7 @@ from picchio.core.registry import classes_in
 from picchio.core.results import TableResult
 from picchio.core.shown import seeing
 from picchio.diagnosis.planning.choose import Choice, Chosen, choose
-from picchio.diagnosis.planning.kind import Test, angles, told_in
+from picchio.diagnosis.planning.kind import REACH, Test, angles, told_in, within_reach
 from picchio.diagnosis.planning.outcome import Outcome, decades, outcome_of
 from picchio.prediction.plan import PlannedTest, TestPlan, plan_toml
 from picchio.robot.flexible_robot import FlexibleRobot
@@ -281,7 +281,8 @@ def plan(
 ) -> PlannedTests:
     """The tests for stiffness and damping that narrow the life on a task most.
 
-    Poses are drawn where the arm can stand without touching itself, and those of the task; records
+    Poses are drawn where the arm can stand without touching itself, and those of the task, as far
+    as a person reaches the tool there (0.2 to 2 m above the floor, z = 0); records
     are taken one after the other by what each is expected to tell of the life for the time that it
     takes (`picchio.diagnosis.planning.choose`), until the time is up or another one would not
     change the answer. What is known already is in the robot's spreads and its posterior: with the
@@ -375,8 +376,13 @@ def _poses(robot: FlexibleRobot, task: Task, seed: int) -> tuple[FloatArray, lis
     every = np.round(every * scale * finest) / finest / scale
     every = every[((every >= robot.lower) & (every <= robot.upper)).all(axis=1)]
     every = every[np.sort(np.unique(every, axis=0, return_index=True)[1])]
-    check = SelfCollision.of(robot, every[0])
+    near = np.array([within_reach(robot, pose) for pose in every])
     notes = ["Look first whether the room is free: only the robot itself was looked at."]
+    if near.any():
+        every = every[near]
+    else:
+        notes.append("At every pose the tool is below {:g} m or above {:g} m.".format(*REACH))
+    check = SelfCollision.of(robot, every[0])
     if isinstance(check, str):
         notes.append(f"Whether links touch was not checked: {check}.")
     else:

@@ -10,7 +10,7 @@ import numpy as np
 from picchio.campaign.record import Record
 from picchio.campaign.tables import Tolerance
 from picchio.core.arrays import FloatArray
-from picchio.diagnosis.planning.kind import Offered, Possible, Test
+from picchio.diagnosis.planning.kind import Offered, Possible, Test, within_reach
 from picchio.diagnosis.planning.outcome import Outcome
 from picchio.diagnosis.stiffness.prior import prior_of, remainder_of
 from picchio.diagnosis.stiffness.responses import make_problem
@@ -70,7 +70,8 @@ class TapTest(Test):
         for place, pose in enumerate(poses[:_POSES]):
             own = [
                 Possible(self.name, place, pose, hit, _HIT, reads, (frame, *reads.tolist()), frame)
-                for frame in frames for hit in WAYS for reads in WAYS
+                for frame in frames if frame is None or within_reach(robot, pose, frame)
+                for hit in WAYS for reads in WAYS
             ]  # fmt: skip
             found, names = _told(robot, own, self, outcome, tolerance)
             each += own
