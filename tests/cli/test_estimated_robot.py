@@ -42,6 +42,9 @@ def test_assess_says_first_what_it_assumes(bare, tmp_path, capsys):
     notice = said.index("Estimated: nobody measured the stiffness, damping and strength")
     assert "Estimated" not in printed.err
     assert "No task was given" in said
+    told = "12 hits a rivet: rectangular pulses of 300 N, 4 ms wide, every 40 ms, assumed"
+    assert said.index(told) < said.index("The joints, 80 % ranges")
+    assert said.index("Allowable force of one blow") < said.index("The joints, 80 % ranges")
     assert notice < said.index("The joints, 80 % ranges") < said.index("pose 5, rad")
     assert "What to measure first" in said
     found = json.loads(out.read_text())
@@ -52,6 +55,9 @@ def test_assess_says_first_what_it_assumes(bare, tmp_path, capsys):
     assert found["operations"][0]["excitation"].startswith("rectangular pulses of 300 N")
     html = page.read_text()
     assert html.count('<tr class="estimate') == 3
+    assert html.index("Allowable force of one blow") < html.index('id="joints"')
+    assert html.index("Tool: frame tool") < html.index('id="joints"')
+    assert "rectangular pulses of 300 N, 4 ms wide, every 40 ms" in html
     assert html.count("nobody measured") == 1 and 'id="measure"' in html
 
 
@@ -95,17 +101,18 @@ def test_an_envelope_is_a_band(bare, tmp_path, capsys):
     assert 0.0 < low < high
 
 
-def test_a_scene_has_a_net_about_what_is_likely(bare):
+def test_a_scene_has_one_envelope_and_its_range_in_words(bare):
     from picchio.visuals.scene.page import scene_html
 
     scene = picchio.view(bare, pose=POSE, excitation=BLOWS)
-    nets = [item for item in scene.items if item.layer == "likely"]
-    assert len(nets) == 3 and all(scene.meshes[item.mesh].wire for item in nets)
-    reach = np.linalg.norm(scene.meshes[nets[1].mesh].vertices, axis=1).max()
-    assert reach == pytest.approx(scene.envelope.peak_interval()[1, 1], rel=0.1)
+    assert sum(item.layer == "envelope" for item in scene.items) == 3
+    for k, label in enumerate(label for label in scene.labels if label["layer"] == "worst"):
+        low, high = 1e3 * scene.envelope.peak_interval()[k]
+        assert f"mrad ({low:.2g} to {high:.2g}) along" in label["text"]
     assert "nobody measured" in scene_html(scene)
     known = picchio.view("fanuc_like_3dof", pose=POSE, excitation=BLOWS)
-    assert not known.notice and not any(item.layer == "likely" for item in known.items)
+    assert not known.notice
+    assert not any("(" in label["text"].partition("along")[0] for label in known.labels)
 
 
 def test_a_map_and_its_plot_say_it(bare, tmp_path, capsys):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 
 DIGITS = 3  # more than these the physics does not deserve
 UNLIMITED = "unlimited"  # a life below the endurance limit, or whatever else nothing bounds
@@ -65,6 +66,17 @@ def between(ends: Sequence[float | None], tell: Callable[..., str] = number) -> 
         tell: writes each.
     """
     return " to ".join(dict.fromkeys(map(tell, ends)))
+
+
+def likely(ends: Sequence[float | None]) -> str:
+    """The interval of an estimated share, 1 being all, in per cent without its sign.
+
+    Args:
+        ends: low and high; an estimate deserves two digits, and below 1 % none.
+    """
+    if all(end is not None and 0.0 <= end < 0.01 for end in ends) and any(ends):
+        return "< 1"
+    return between(ends, partial(per_cent, digits=2))
 
 
 def factor(decades: float) -> str:

@@ -292,12 +292,8 @@ def show(found: Assessment, task: Task, terms: tuple[Term, ...] = ()) -> None:
     told, allowed = found.verdict, found.allowable
     on = f" on {task.files[0].name}" if task.files else ""
     out.print(styled(f"{found.robot}{on}: {told.headline}"))
-    if allowed is not None and not allowed.contrary:
-        out.print(
-            f"Allowable force of one blow: {allowed.force_told}, for "
-            f"{spoken.count(allowed[0].rivets)} rivets with blows of this width and rate.",
-            style="bold",
-        )
+    if allowed is not None and allowed.told:
+        out.print(allowed.told, style="bold")
     every = list(dict.fromkeys(_blows(operation) for operation in found.operations))
     whose = "" if not task.assumed else ", of its example task" if task.files else ", assumed"
     for blows in every:

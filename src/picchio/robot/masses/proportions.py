@@ -129,7 +129,7 @@ def out_of_proportion(tree: UrdfTree, tool: str) -> Iterator[Finding]:
             what = " and ".join(_MEASURES[name].said(values[name]) for name in told)
             reasons = "".join(f" ({_MEASURES[name].why})" for name in wrong[:1])
             severity = "impossible" if wrong else "doubtful"
-            yield Finding("the whole arm", f"has {what}{reasons}", why, severity)  # type: ignore[arg-type]
+            yield Finding("the whole arm", f"it has {what}{reasons}", why, severity)  # type: ignore[arg-type]
 
 
 def _measured(tree: UrdfTree, tool: str) -> dict[str, float]:

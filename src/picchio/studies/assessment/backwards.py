@@ -180,6 +180,16 @@ class AllowableLoads(TableResult):
         return min(known, default=None)
 
     @property
+    def told(self) -> str:
+        """The force that one blow may have; "" where nothing can be told."""
+        if self.contrary:
+            return ""
+        return (
+            f"Allowable force of one blow: {self.force_told}, for "
+            f"{spoken.count(self[0].rivets)} rivets with blows of this width and rate."
+        )
+
+    @property
     def answer(self) -> str:
         """Yes, no, or why it cannot be told; then what may be changed."""
         first = self.joints[0]

@@ -201,10 +201,11 @@ class JointLife:
             key: such as "reducer_utilisation".
 
         Returns:
-            such as "85.2" or "60.1 to 130"; "-" where it is not known.
+            such as "85.2" or "60 to 130"; "-" where it is not known.
         """
-        value = getattr(self, key)
-        return spoken.between(self.intervals.get(key, (value,)), spoken.per_cent)
+        if key in self.intervals:
+            return spoken.likely(self.intervals[key])
+        return spoken.per_cent(getattr(self, key))
 
     def told_interval(self, key: str) -> str:
         """P10 to P90 of a value, its number where it has no spread.

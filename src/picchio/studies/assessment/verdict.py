@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
+from picchio.core import spoken
 from picchio.robot.joint import is_drive
 
 if TYPE_CHECKING:
@@ -143,11 +144,8 @@ class _Part(NamedTuple):
 
     @property
     def used(self) -> str:
-        if self.share is not None:
-            low, high = (f"{100.0 * share:.3g}" for share in self.share)
-            if low != high:
-                return f"{low} to {high} % of its {self.limit}"
-        return f"{100.0 / self.margin:.3g} % of its {self.limit}"
+        share = spoken.likely(self.share) if self.share else spoken.per_cent(1.0 / self.margin)
+        return f"{share} % of its {self.limit}"
 
     @property
     def margin_at_other_rates(self) -> float:
@@ -206,7 +204,7 @@ def judge(found: Assessment) -> Verdict:
         word = "Probably safe" if guess and status == "safe" else _SAID[status]
         if status in ("safe", "limited"):
             text = f"{_covered(found, gaps, wearing)}. {text}"
-        headline = f"{word}. {text}."
+        headline = f"{word}. {text}" + "." * (text[-1] not in ".?")
         limit = part.limit if part else ""
         # Only of a part that is judged by its margin.
         ends = part.interval if part and not math.isnan(margin) else None

@@ -8,13 +8,12 @@ from typing import Literal
 import numpy as np
 from matplotlib.axes import Axes
 
+from picchio.core import spoken
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.robot.units import labelled
 from picchio.studies.envelopes import DirectionEnvelope, Quantity
 from picchio.visuals.plots.style import (
-    ESTIMATED,
-    HATCH,
     INK,
     MUTED,
     axes_or_new,
@@ -64,15 +63,15 @@ def plot_polar_envelope(
         quantity: "deflection" (mrad, mm), "torque" (N m, N) or "stress" (MPa).
         count: directions over half a turn; the other half is its mirror image.
 
-    Where values are estimates, the line is of the most likely ones, and the hatched band holds 80 %
-    of the drawn cases.
+    Where values are estimates, the line is of the most likely ones, and the legend tells the range
+    of the largest peak in 80 % of the drawn cases.
 
     Raises:
         InputError: an unknown plane, joint or quantity.
     """
     ax = axes_or_new(ax, width=5.4, height=4.2, polar=True)
     angle, directions = cut_directions(plane, count)
-    support, band = envelope.support(directions, quantity), envelope.band(directions, quantity)
+    support, ends = envelope.support(directions, quantity), envelope.peak_interval(quantity)
     unit, factor = _UNITS[quantity]
     units = [kind.of(unit) for kind in envelope.units]
     unit, names = labelled(units, map(plain, envelope.joint_names))
@@ -86,15 +85,15 @@ def plot_polar_envelope(
         radius = np.concatenate([support[j], support[j], support[j][:1]]) * factor
         turn = np.concatenate([angle, angle + np.pi, [2 * np.pi]])
         style = look(j)
-        ax.plot(turn, radius, label=names[j], **style)
+        told = names[j]
         if envelope.estimated:
-            low, high = (np.concatenate([end, end, end[:1]]) * factor for end in band[:, j])
-            ax.fill_between(turn, low, high, facecolor="none", edgecolor=style["color"],
-                            hatch=HATCH, linewidth=0.0, alpha=0.45)  # fmt: skip
-        else:
-            ax.fill(turn, radius, color=style["color"], alpha=0.10)
+            told += f"\n{spoken.between([float(f'{end * factor:.2g}') for end in ends[j]])}"
+        ax.plot(turn, radius, label=told, **style)
+        ax.fill(turn, radius, color=style["color"], alpha=0.10)
     title = f"Peak {quantity} by force direction, {plane} plane [{unit}]"
-    ax.set_title(f"{title}\n{ESTIMATED}" if envelope.estimated else title, pad=18)
+    if envelope.estimated:
+        title += "\nestimated; in numbers: 80 % ranges"
+    ax.set_title(title, pad=18)
     ax.set_xticks(np.arange(8) * np.pi / 4,
                   [f"+{plane[0]}", "45°", f"+{plane[1]}", "135°", f"−{plane[0]}", "225°",
                    f"−{plane[1]}", "315°"], color=INK)  # fmt: skip

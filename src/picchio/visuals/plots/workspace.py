@@ -20,6 +20,8 @@ from picchio.visuals.plots.style import CMAP, HATCH, PAPER, STYLE, axes_or_new, 
 if TYPE_CHECKING:
     import xarray
 
+_TALL = 4  # joints: more in one column make a picture that no screen shows
+
 
 def dataset_of(workspace: WorkspaceMap | xarray.Dataset) -> xarray.Dataset:
     """The dataset of a map."""
@@ -68,7 +70,7 @@ def spacing(places: FloatArray) -> float:
 
 
 def workspace_figure(workspace: WorkspaceMap | xarray.Dataset) -> Figure:
-    """A map of every joint, below each other.
+    """A map of every joint, below each other; of many joints in two columns.
 
     Args:
         workspace: of `picchio.workspace_map`, or its dataset.
@@ -81,9 +83,14 @@ def workspace_figure(workspace: WorkspaceMap | xarray.Dataset) -> Figure:
     """
     names = [str(name) for name in dataset_of(workspace)["joint"].values]
     with mpl.rc_context(STYLE):  # type: ignore[arg-type]
-        figure = Figure(figsize=(6.2, 4.4 * len(names)), layout="constrained")
-        for name, ax in zip(names, figure.subplots(len(names), squeeze=False)[:, 0], strict=True):
+        columns = 1 if len(names) < _TALL else 2
+        rows = -(-len(names) // columns)
+        figure = Figure(figsize=(6.2 * columns, 4.4 * rows), layout="constrained")
+        room = figure.subplots(rows, columns, squeeze=False).ravel()
+        for name, ax in zip(names, room, strict=False):
             plot_workspace_map(workspace, name, ax)
+        for ax in room[len(names) :]:
+            ax.remove()
     return figure
 
 
@@ -129,7 +136,7 @@ def plot_workspace_map(
         ax.set_title(f"{ax.get_title(loc='left')}\nestimated: at the most likely values")
         ax.add_patch(Rectangle((0, 0), 1, 1, transform=ax.transAxes, fill=False, hatch=HATCH,
                                edgecolor=PAPER, linewidth=0.0, alpha=0.35))  # fmt: skip
-    bar = ax.figure.colorbar(shown, ax=ax, shrink=0.85, pad=0.02)
+    bar = ax.figure.colorbar(shown, ax=ax, pad=0.02)
     bar.set_label(f"peak deflection [{unit}]")
     bar.outline.set_visible(False)  # type: ignore[operator]
     return ax

@@ -40,6 +40,7 @@ from picchio.visuals.report.trace import Trace, traces_html
 from picchio.visuals.scene.portrait import plot_robot
 from picchio.visuals.worst_rivet import WorstRivet, worst_rivet
 
+_LITTLE = 0.02  # of the variance: the same as on a terminal
 _DRAWN = 6000  # samples of a plot that zooms, at most
 
 # The report's plots, each with an alt text that says what it shows.
@@ -74,11 +75,12 @@ def _figures(
             "Damage a rivet does to every joint, by operation",
             "Miner's sum of one rivet, the mean over the task; at a sum of 1 the joint fails.",
             main=True)  # fmt: skip
-    if spread is not None:
+    if spread is not None and spread.robot.endless < 1.0:
         add(plot_life_spread(spread, blank_figure(height=1.1 + 0.36 * (joints + 1))),
             "Lives that 90, 50 and 10 percent of the possible worlds exceed, by joint",
             "From P10 to P90, the dot is the median; what was varied stands below.",
             main=True)  # fmt: skip
+    if spread is not None:
         for name, scan in spread.scans.items():
             add(plot_life_scan(name, scan, blank_figure(height=2.7)),
                 f"Life of the robot against a factor on {name}: it falls and rises again",
@@ -242,6 +244,8 @@ def assessment_report(
     curve = _curve(sn_curve, robot, life.sn_curve)
     told = assessment.verdict
     answer = allowed if isinstance(allowed, AllowableLoads) else None
+    varied = sorted(spread.inputs, key=lambda n: -spread.robot.shares[n]) if spread else []
+    unvaried = [name for name in varied if spread and spread.robot.shares[name] < _LITTLE]
     return render(
         "assessment.html.j2",
         a=assessment,
@@ -262,7 +266,8 @@ def assessment_report(
         allowed=list(allowed),
         answer=answer,
         spread=spread,
-        varied=sorted(spread.inputs, key=lambda n: -spread.robot.shares[n]) if spread else [],
+        varied=[name for name in varied if name not in unvaried],
+        unvaried=unvaried,
         spread_rows=[*spread.joints.items(), ("robot", spread.robot)] if spread else [],
         terms=list(terms),
         shafts=any(joint.sn_curve for joint in assessment.joints),

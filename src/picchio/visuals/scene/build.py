@@ -16,7 +16,7 @@ from picchio.excitation.excitation import Excitation
 from picchio.model.model import Model, ModelLike
 from picchio.robot.annotations.flexibility import estimate_notice
 from picchio.studies.assessment.result import Assessment
-from picchio.studies.envelopes import DirectionEnvelope, icosphere
+from picchio.studies.envelopes import DirectionEnvelope
 from picchio.studies.envelopes import envelope as envelope_of
 from picchio.studies.maps.result import WorkspaceMap, response_of
 from picchio.studies.maps.stored import values_of
@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from picchio.diagnosis.percussion.diagnosis import PercussionDiagnosis
 
 _MOST_PLACES = 8000  # of a map in a page
-_SHELL = 2  # subdivisions of the net about what is estimated
 
 
 def build_scene(
@@ -194,16 +193,11 @@ def _add_envelopes(scene: Scene, body: Body, units: list[str], subdivisions: int
     envelope = scene.envelope
     scene.layers.append(("envelope", "direction envelope at the tool", True))
     scene.layers.append(("worst", "worst direction", True))
-    if envelope.estimated:
-        text = "estimated: each way, 90 % of the cases lie within this net"
-        scene.layers.append(("likely", text, True))
     # A translucent double ball a joint, in rad (m for a prismatic joint).
     surfaces, faces = envelope.surfaces(subdivisions)
     size = 0.26 * body.reach
     pointer = scene.add(arrow(1.18 * size, 0.011 * body.reach, "#c2410c", head=0.075 * body.reach))
     interval = envelope.peak_interval()
-    directions, edges = icosphere(_SHELL)
-    shells = envelope.band(directions)[1] if envelope.estimated else []
     for k, (name, unit, surface) in enumerate(
         zip(envelope.joint_names, units, surfaces, strict=True)
     ):
@@ -215,18 +209,15 @@ def _add_envelopes(scene: Scene, body: Body, units: list[str], subdivisions: int
         place = np.diag([factor, factor, factor, 1.0])
         place[:3, 3] = envelope.tool_position
         scene.items.append(Item(scene.add(mesh), "envelope", "", place, joint=k))
-        if envelope.estimated:
-            shell = Mesh(
-                directions * shells[k][:, None], edges, opacity=0.35, exact=True, wire=True
-            )
-            scene.items.append(Item(scene.add(shell), "likely", "", place, joint=k))
         along = envelope.worst_direction[k]
         scene.items.append(
             Item(pointer, "worst", "", turned_to(along, envelope.tool_position), joint=k)
         )
-        low, high = (f"{1e3 * end:.3g}" for end in interval[k])
-        told = f"{low} to {high}" if envelope.estimated else f"{peak * 1e3:.3g}"
-        text = f"{name}: {told} {unit} along {direction_label(along)}"
+        told = f"{peak * 1e3:.3g} {unit}"
+        if envelope.estimated:
+            low, high = (f"{1e3 * end:.2g}" for end in interval[k])
+            told = f"{peak * 1e3:.2g} {unit} ({low} to {high})"
+        text = f"{name}: {told} along {direction_label(along)}"
         tip = envelope.tool_position + 1.2 * size * along
         scene.labels.append({"text": text, "layer": "worst", "at": tip.tolist(), "joint": k})
         scene.joints.append({"name": name, "scale": scale.to_dict(), "peak": peak, "text": text})
@@ -313,5 +304,7 @@ def _aim(scene: Scene, body: Body, places: dict[str, FloatArray]) -> None:
     cell = next((c for c in (0.05, 0.1, 0.25, 0.5) if 24 * c > 2.4 * body.reach), 1.0)
     squares = 2 * int(np.ceil(1.2 * body.reach / cell))
     middle = np.round(centre[:2] / cell) * cell
-    scene.floor = {"cell": cell, "squares": squares, "at": [*middle.tolist(), float(points[0][2])]}
+    # Who reaches below the robot's foot has it on a pedestal.
+    ground = min([float(points[0][2]), *(float(part[:, 2].min()) for part in mapped)])
+    scene.floor = {"cell": cell, "squares": squares, "at": [*middle.tolist(), ground]}
     scene.camera = np.array([centre + view / np.linalg.norm(view) * 1.25 * span, centre])

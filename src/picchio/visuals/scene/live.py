@@ -20,9 +20,9 @@ from picchio.visuals.scene.robot.mesh import Mesh, rgb
 if TYPE_CHECKING:
     from picchio.visuals.scene.scene import Item, Scene
 
-_SINGLE = ("envelope", "likely", "worst", "map")
+_SINGLE = ("envelope", "worst", "map")
 """Layers of which one joint is shown at a time."""
-_GROWING = ("envelope", "likely", "worst")
+_GROWING = ("envelope", "worst")
 
 
 def send(scene: Scene, viewer: Any) -> None:
@@ -54,7 +54,6 @@ def send(scene: Scene, viewer: Any) -> None:
             opacity=mesh.opacity,
             transparent=mesh.opacity < 1.0,
             side=2,
-            wireframe=mesh.wire,
             depthWrite=mesh.opacity >= 1.0,
         )
         root[path].set_object(geometry, material)

@@ -48,7 +48,7 @@ class Packer:
     def add_mesh(self, mesh: Mesh) -> dict[str, Any]:
         """A mesh as references; see `Mesh.exact` for how exact."""
         packed: dict[str, Any] = {
-            "crease": mesh.crease, "opacity": mesh.opacity, "wire": mesh.wire,
+            "crease": mesh.crease, "opacity": mesh.opacity,
             "colour": mesh.colour,
         }  # fmt: skip
         vertices = np.asarray(mesh.vertices, dtype=float)

@@ -97,7 +97,8 @@ def plot_robot(
         )  # fmt: skip
     _finished(axes, view, tool, reach)
     if len(assessment.operations) > 1:
-        axes.legend(loc="upper left", markerscale=1.6, labelcolor=INK)
+        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, markerscale=1.6,
+                    labelcolor=INK)  # fmt: skip
     return axes
 
 

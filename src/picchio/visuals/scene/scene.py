@@ -66,7 +66,7 @@ class Scene(Page, Result):
         chosen: index of the joint whose envelope is shown at first.
         reach: m, size of the robot.
         envelope: what the double balls are of.
-        verdict: of the task's assessment, where one is shown.
+        verdict: of the diagnosis that is shown, or else of the task's assessment.
         notice: what of the drives is an estimate; "" where nothing is.
         file: where it was saved last, or None.
     """

@@ -38,6 +38,8 @@ def add_causes(scene: Scene, site: Callable[..., Site], found: Diagnosis) -> Non
     scene.playing = False  # what moves is hard to point at
     labels: list[dict[str, Any]] = []
     told: list[dict[str, str]] = []
+    named = "; ".join(map(cause_text, found.causes)) or VERDICTS[found.verdict]
+    scene.verdict = f"{found.verdict.replace('-', ' ').capitalize()}: {named}."
     scene.diagnosis = {"verdict": f"{found.verdict.replace('-', ' ')}: {VERDICTS[found.verdict]}",
                        "lines": told}  # fmt: skip
     for layer, cause in _causes(found):

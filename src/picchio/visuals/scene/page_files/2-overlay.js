@@ -7,7 +7,7 @@ const base = new THREE.Matrix4(), grow = new THREE.Matrix4();
 function drawOverlay() {
   for (const { object, item } of made) {
     object.visible = shown(item.layer, item.joint);
-    if (["envelope", "likely", "worst"].includes(item.layer)) {
+    if (["envelope", "worst"].includes(item.layer)) {
       base.fromArray(item.matrix);
       grow.makeScale(state.size, state.size, state.size);
       base.multiply(grow);

@@ -24,7 +24,6 @@ class Mesh:
         opacity: below 1 it is drawn translucent.
         exact: keep the vertices as 32-bit floats; else 16-bit integers within the bounding cube.
         crease: degrees; edges sharper than this are drawn sharp.
-        wire: only its edges are drawn: of what is an estimate.
     """
 
     vertices: FloatArray
@@ -34,7 +33,6 @@ class Mesh:
     opacity: float = 1.0
     exact: bool = False
     crease: float = 40.0
-    wire: bool = False
 
 
 def merged(meshes: list[Mesh]) -> Mesh:

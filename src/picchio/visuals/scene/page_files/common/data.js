@@ -82,7 +82,7 @@ function material(mesh, item, order) {
   return new THREE.MeshPhongMaterial({
     color: coloured ? 0xffffff : item.colour || mesh.colour, vertexColors: coloured,
     transparent: translucent, opacity: mesh.opacity, depthWrite: !translucent,
-    side: THREE.DoubleSide, wireframe: mesh.wire, shininess: 12, specular: 0x181818,
+    side: THREE.DoubleSide, shininess: 12, specular: 0x181818,
     // URDFs lay faces upon one another: the later one wins everywhere instead of in spots.
     polygonOffset: true, polygonOffsetFactor: 0, polygonOffsetUnits: -2 * order,
   });
