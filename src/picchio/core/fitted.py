@@ -43,7 +43,7 @@ class FittedValue:
         share = f" ({self.stderr / abs(self.value):.2%})" if self.value else ""
         ends = (
             ""
-            if math.isinf(self.min) and math.isinf(self.max)
+            if math.isinf(self.min) or math.isinf(self.max)
             else (f", within {self.min:g} to {self.max:g}")
         )
         return f"{self.value:.5g} +/- {self.stderr:.2g}{unit}{share}{ends}"
