@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
-
 import pytest
 
-import picchio.paper as package
-from picchio.paper import printed as printed_module
-from picchio.paper.assumptions import Assumptions
+from picchio.paper.printed import printed
 from picchio.paper.study import Study
+from picchio.paper.world import Assumptions
 
 
 @pytest.fixture(scope="session")
@@ -20,23 +16,15 @@ def study():
 
 
 @pytest.fixture
-def altered(monkeypatch):
+def altered():
     """A study of a paper with other values: altered(arm={...}, table2=...)."""
-    from picchio.paper import arm
 
     def make(given=None, count=8, **changes):
-        paper = printed_module.printed()
+        paper = printed()
         for part, values in changes.items():
             if isinstance(values, dict):
                 values = getattr(paper, part).model_copy(update=values)
             paper = paper.model_copy(update={part: values})
-        for found in pkgutil.walk_packages(package.__path__, "picchio.paper."):
-            module = importlib.import_module(found.name)
-            if callable(getattr(module, "printed", None)):
-                monkeypatch.setattr(module, "printed", lambda: paper)
-        arm._bare_arm.cache_clear()
-        return Study(given or Assumptions(), count=count)
+        return Study(given or Assumptions(), count=count, printed=paper)
 
-    yield make
-    monkeypatch.undo()
-    arm._bare_arm.cache_clear()
+    return make

@@ -5,10 +5,15 @@ import pytest
 
 import picchio
 from picchio.fatigue.shaft_stress import check_shaft
-from picchio.paper.arm import arm, places_of, poses_at, rivet_points
-from picchio.paper.assumptions import Assumptions
 from picchio.paper.printed import printed
-from picchio.paper.world import random_worlds
+from picchio.paper.world import (
+    Assumptions,
+    arm,
+    places_of,
+    poses_at,
+    random_worlds,
+    rivet_points,
+)
 
 
 @pytest.fixture(scope="module")

@@ -26,7 +26,7 @@ def test_a_table_by_the_printed_curve_is_told(factor, name):
     paper = printed()
     found = curve_of_table(table(paper.sn_curve.cycles(paper.stress) / factor))
     assert found.fits[0].name == name
-    assert found.fits[0].aside is None
+    assert found.fits[0].set_aside is None
     assert np.abs(found.fits[0].residuals).max() < 0.01
 
 
@@ -40,7 +40,7 @@ def test_a_table_by_another_curve_and_its_misprint_are_told(out):
         cycles[row, joint] *= 1.8
     found = curve_of_table(table(cycles)).fits[0]
     assert found.name == "another curve S = a N^b"
-    assert found.aside == out
+    assert found.set_aside == out
     assert found.values["exponent"] == pytest.approx(2.3, rel=1e-3)
     assert found.values["a"] == pytest.approx(5.0e4, rel=1e-2)
 
@@ -50,7 +50,7 @@ def test_a_table_of_noise_belongs_to_no_curve():
     rng = np.random.default_rng(5)
     cycles = np.where(paper.stress > 0, 10 ** rng.uniform(5, 8, (3, 3)), np.inf)
     found = curve_of_table(table(cycles)).fits[0]
-    assert np.nanmedian(np.abs(found.left_out)) > 0.3
+    assert found.left_out_median > 0.3
 
 
 def test_the_papers_own_table():
@@ -58,8 +58,8 @@ def test_the_papers_own_table():
     assert found.over_printed.min() == pytest.approx(12.2, abs=0.05)
     assert found.over_printed.max() == pytest.approx(115.9, abs=0.1)
     best = found.fits[0]
-    assert found.labels[best.aside] == "left, joint 3"
-    kept = np.delete(np.arange(8), best.aside)
+    assert found.labels[best.set_aside] == "left, joint 3"
+    kept = np.delete(np.arange(8), best.set_aside)
     # By numpy alone: a line through the logarithms of the other seven.
     slope, start = np.polyfit(np.log(found.stress[kept]), np.log(found.cycles[kept]), 1)
     assert best.values["exponent"] == pytest.approx(-slope)

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from picchio.paper.assumptions import Assumptions
+from picchio.paper.claims import Verdict, try_claim
 from picchio.paper.printed import printed
-from picchio.paper.verdict import CLAIMS, Verdict
+from picchio.paper.world import Assumptions
 
 HOLDS, ONLY_IF, FAILS = Verdict.HOLDS, Verdict.CONDITIONAL, Verdict.FAILS
 
 
 def verdict(study, name):
-    return CLAIMS[name].test(study).verdict
+    return try_claim(study, name).verdict
 
 
 def rows(**changes):
@@ -88,7 +88,7 @@ def test_a_soft_joint_1_always_leads(altered):
 
 
 def test_with_strong_damping_the_steady_state_stands_in(study, altered):
-    assert CLAIMS["transient"].test(study).number > 1.5
+    assert try_claim(study, "transient").number > 1.5
     quiet = altered(given=Assumptions(damping_ratio=0.9), count=0)
     assert verdict(quiet, "transient") is HOLDS
 

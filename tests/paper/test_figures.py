@@ -6,26 +6,17 @@ import numpy as np
 import pytest
 
 from picchio.core.results import plain
-from picchio.paper.assumptions import Assumptions
-from picchio.paper.conflicts import conflicts
-from picchio.paper.figures import blows, envelope, life, reach, rivets, table2
-from picchio.paper.influence import influences
+from picchio.paper.figures import FIGURES, paper_figure
+from picchio.paper.run import conflicts
 from picchio.paper.study import Study
-from picchio.paper.waterfall import waterfall
+from picchio.paper.world import Assumptions
 
 
 @pytest.fixture(scope="module")
 def figures(study):
     """All but those that need the hypotheses with the arm."""
-    made = [
-        blows.figure_4(study), blows.figure_8(study), blows.steady_state(study),
-        blows.phase(study), envelope.figure_9(study), *envelope.dominance(study),
-        envelope.reach_of_path(study), reach.figure_10(study), reach.rings(study),
-        *reach.axis_forces(study), life.figure_11(study), *life.gravity(study),
-        life.shaft(study), life.corrections(waterfall(study.base)), rivets.figure_12(study),
-        rivets.influence(study), table2.lives(study),
-    ]  # fmt: skip
-    return {figure.name: figure for figure in made}
+    names = FIGURES.keys() - {"hypotheses", "fig-13-15"}
+    return {name: paper_figure(study, name) for name in names}
 
 
 @pytest.mark.slow
@@ -40,7 +31,7 @@ def test_each_can_be_drawn_and_told(figures):
 
 @pytest.mark.slow
 def test_every_conflict_has_its_number_and_its_figure(study, figures):
-    found = tuple(conflicts(study, figures))
+    found = conflicts(figures)
     assert len({conflict.name for conflict in found}) == len(found) >= 9
     for conflict in found:
         assert conflict.figure in figures
@@ -52,15 +43,15 @@ def test_the_bend_that_the_path_needs_by_hand(study):
     x = np.sqrt(1.6**2 - 1.1**2)
     distance = np.hypot(x, 0.2)
     by_hand = np.degrees(2.0 * np.arccos(distance / 1.6))
-    data = envelope.reach_of_path(study).data
+    data = paper_figure(study, "range").data
     assert data["least_bend_deg"] == pytest.approx(by_hand, abs=0.5)
     assert data["at_x"] == pytest.approx(x, abs=0.01)
     assert data["limit_deg"] == pytest.approx(70.0)
 
 
 def test_rings_and_axes(study):
-    assert reach.rings(study).data["spread"] < 1e-9
-    along_x, along_z = reach.axis_forces(study)
+    assert paper_figure(study, "rings").data["spread"] < 1e-9
+    along_x, along_z = (paper_figure(study, f"{axis}-force") for axis in "xz")
     forces = along_x.data["joint_1"]
     assert max(forces["x"]) < 1e-12 < max(forces["y"])
     straight_up = along_z.data["joint_2"]
@@ -71,14 +62,14 @@ def test_rings_and_axes(study):
 def test_the_largest_envelopes_are_the_exact_ones(study):
     from picchio.studies.envelopes import envelope as envelope_of
 
-    ours = envelope.figure_9(study).data["peak_mrad"]
+    ours = paper_figure(study, "fig-9").data["peak_mrad"]
     for k, pose in enumerate(study.base.path_poses):
         exact = envelope_of(study.base.model, pose, study.base.blows)
         np.testing.assert_allclose(ours[k], 1e3 * exact.peak_deflection, rtol=1e-5)
 
 
 def test_influences_that_are_known_by_hand(study):
-    rows = {row.name: row for row in influences(study)}
+    rows = {row.name: row for row in study.influences}
     exponent = study.printed.sn_curve.exponent
     # Life goes with stress to minus m, and stress with G r / l.
     assert rows["stress_per_twist"].factor == pytest.approx(8.0**exponent, rel=1e-6)
@@ -88,11 +79,8 @@ def test_influences_that_are_known_by_hand(study):
 
 
 def test_the_sequence_is_looked_for_in_the_same_worlds_again(study):
-    from picchio.paper.dominance import search_dominance
-
-    found = search_dominance(study)
-    assert found is search_dominance(study)
-    assert (found.agree == 4).sum() == found.hits
+    found = study.sequences
+    assert (found.agree == 4).sum() == found.counts[4] > 0
     assert found.example is not None
     joints = found.example.path_peaks.peak_deflection.argmax(axis=1) + 1
     assert tuple(joints) == study.printed.task.dominant_joints

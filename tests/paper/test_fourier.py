@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from picchio.excitation.pulse_train import PulseTrain
-from picchio.paper.fourier import amplitude_and_phase, printed_force, printed_series
+from picchio.paper.equations import printed_force, printed_series
 
 
 def test_eq_12_is_the_pulses_integral():
@@ -25,9 +25,9 @@ def test_eq_12_comes_to_the_pulse_between_its_edges():
 
 
 def test_eq_13_is_exact_with_the_right_quadrant_only(study):
-    found = amplitude_and_phase(study.base)
-    np.testing.assert_allclose(found.right, found.exact, rtol=1e-6)
-    assert found.plain_history > 0.01
+    found = study.phase
+    np.testing.assert_allclose(found["right"], found["exact"], rtol=1e-6)
+    assert found["plain_history"] > 0.01
 
 
 def test_gravity_by_hand(study):

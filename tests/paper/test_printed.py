@@ -1,25 +1,40 @@
 """The data file holds what the paper prints, and every sentence in it is tried."""
 
 import re
+from pkgutil import resolve_name
 
 import numpy as np
 import pytest
 
-from picchio.paper.assumptions import INPUTS, Assumptions, parse_assumptions
-from picchio.paper.printed import printed
-from picchio.paper.verdict import CLAIMS, claim
+from picchio.paper.claims import OF_STUDY, OF_WORLD
+from picchio.paper.equations import GAPS
+from picchio.paper.figures import FIGURES
+from picchio.paper.printed import printed, trials
+from picchio.paper.world import Assumptions, parse_assumptions
 
 
 def test_every_sentence_is_tried_and_every_test_has_its_sentence():
-    assert set(CLAIMS) == set(printed().claims)
-    assert len(CLAIMS) >= 20
+    claims = trials().claims
+    assert set(claims) == set(printed().claims)
+    assert len(claims) >= 20
+    assert (OF_WORLD | OF_STUDY).keys() >= {k for k, claim in claims.items() if not claim.unknown}
+    assert not OF_WORLD.keys() & OF_STUDY.keys()
+    assert claims.keys() >= OF_WORLD.keys() | OF_STUDY.keys()
     for sentence in printed().claims.values():
         assert 292 <= sentence.page <= 301
 
 
-def test_a_claim_can_be_added_once():
-    with pytest.raises(ValueError, match="twice"):
-        claim(name="poses")(lambda study: None)
+def test_what_is_tried_names_what_exists():
+    told = trials()
+    assert told.figures.keys() == FIGURES.keys()
+    assert {entry["figure"] for entry in told.conflicts.values()} <= FIGURES.keys()
+    figures = {claim.figure for claim in told.claims.values()}
+    assert figures <= FIGURES.keys() | {"", "table-2", "equations"}
+    assert {entry["gap"] for entry in told.equations.values()} == GAPS.keys()
+    for entry in told.equations.values():
+        assert callable(resolve_name(entry["function"]))
+    for claim in told.claims.values():
+        assert set(claim.among) <= told.inputs.keys()
 
 
 def test_the_equations_are_all_there():
@@ -28,9 +43,9 @@ def test_the_equations_are_all_there():
 
 def test_every_input_has_a_base_value_within_its_range():
     base = Assumptions()
-    assert {entry.name for entry in INPUTS} == set(vars(base))
-    for entry in INPUTS:
-        value = getattr(base, entry.name)
+    assert trials().inputs.keys() == vars(base).keys()
+    for name, entry in trials().inputs.items():
+        value = getattr(base, name)
         if entry.choices:
             assert value in entry.choices
         else:

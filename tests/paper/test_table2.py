@@ -3,12 +3,21 @@
 import numpy as np
 import pytest
 
-from picchio.paper.assumptions import Assumptions
 from picchio.paper.printed import printed
-from picchio.paper.table2.fit import Target, evaluate, refine
-from picchio.paper.table2.place import Place, decode, encode, steady_extremes
-from picchio.paper.table2.rules import at_mean, at_worst, by_miner, rules
-from picchio.paper.world import World
+from picchio.paper.table2.by_arm import (
+    Place,
+    Target,
+    at_mean,
+    at_worst,
+    by_miner,
+    decode,
+    encode,
+    evaluate,
+    refine,
+    rules,
+    steady_extremes,
+)
+from picchio.paper.world import Assumptions, World
 from picchio.vibration.closed_form.modes import modal_analysis
 from picchio.vibration.closed_form.response import steady_state
 

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from picchio.fatigue.sn.library import load_sn_curve
-from picchio.paper.waterfall import CORRECTIONS, STEEL, paper_lives, waterfall
+from picchio.paper.life import CORRECTIONS, STEEL, paper_lives
 from picchio.studies.assessment.run import assess
 from picchio.studies.tasks import Task
 
 
 @pytest.fixture(scope="module")
 def steps(study):
-    return {step.corrections: step for step in waterfall(study.base)}
+    return {step.corrections: step for step in study.steps}
 
 
 def by_assess(study, **options):
@@ -28,7 +28,7 @@ def test_the_papers_method_is_that_of_assess(study, steps):
     curve = study.printed.sn_curve.sn_curve()
     found = by_assess(study, method="paper", sn_curve=curve)
     assert steps[()].rivets == pytest.approx(found.rivets_to_failure, rel=1e-6)
-    assert f"joint_{steps[()].joint + 1}" == found.limiting_joint
+    assert f"joint_{steps[()].joint}" == found.limiting_joint
     lives = [joint.rivets_to_failure for joint in found.joints]
     np.testing.assert_allclose(paper_lives(study.base), lives, rtol=1e-5)
 

@@ -7,13 +7,14 @@ from collections.abc import Sequence
 from importlib.resources import files
 from typing import Any
 
-from picchio.paper.assumptions import INPUTS
+import numpy as np
+
+from picchio.paper.claims import Verdict
+from picchio.paper.printed import trials
 from picchio.paper.run import Reproduction
-from picchio.paper.verdict import Verdict
 from picchio.visuals.report.page import inline_svg, page_environment
 
-_MARKS = {"holds": "good", "holds only if": "partly", "does not hold": "bad",
-          "cannot be known": "open"}  # fmt: skip
+_MARKS = dict(zip(map(str, Verdict), ("good", "partly", "bad", "open"), strict=True))
 REDRAWN = ("fig-4", "fig-8", "fig-9", "fig-10", "fig-11", "fig-12", "fig-13-15")
 
 
@@ -36,33 +37,30 @@ def reproduction_page(
 
     environment = page_environment("picchio.paper")
     environment.filters.update(
-        mark=_MARKS.__getitem__, gap=_gap, value=_value,
+        mark=_MARKS.__getitem__,
+        gap=_gap,
+        value=_value,
+        median=_median,
+        rms=_rms,
         power=lambda x: Markup(power(float(x))),
-    )  # fmt: skip
-    template = environment.get_template("page.html.j2")
+    )
     own = files("picchio.paper") / "page_files" / "page.css"
-    style = Markup(environment.globals["style"]) + Markup(own.read_text("utf-8"))
-    shown: dict[str, Any] = {
-        name: inline_svg(figure.plot().axes[0], figure.alt, name.replace("-", ""))
-        for name, figure in found.figures.items()
-    }
-    return template.render(
-        style=style,
+    holds = (c.page for c in found.claims if c.verdict is Verdict.HOLDS)
+    return environment.get_template("page.html.j2").render(
+        style=Markup(environment.globals["style"]) + Markup(own.read_text("utf-8")),
         r=found,
-        inputs=INPUTS,
-        svg=shown,
+        inputs=trials().inputs,
+        svg={
+            name: inline_svg(figure.plot().axes[0], figure.alt, name.replace("-", ""))
+            for name, figure in found.figures.items()
+        },
         redrawn=[found.figures[name] for name in REDRAWN],
         extra=[found.figures[name] for name in ("fig-9-found",) if name in found.figures],
-        endless=math.isinf(found.steps[-1].rivets),
-        units={i.name: f" [{i.unit}]" if i.unit not in ("", "–") else "" for i in INPUTS},
-        gaps=[e.gap for e in found.equations if e.gap is not None],
-        verdicts={tried.claim.name: str(tried.finding.verdict) for tried in found.claims},
-        of_abstract=sum(
-            tried.finding.verdict is Verdict.HOLDS
-            for tried in found.claims
-            if tried.sentence.page == found.study.printed.abstract_page
-        ),
-        influence={row.name: row for row in found.influences},
+        endless=math.isinf(found.study.steps[-1].rivets),
+        gaps=[e["gap"] for e in found.equations if e["gap"] is not None],
+        verdicts={c.name: str(c.verdict) for c in found.claims},
+        of_abstract=sum(page == found.study.printed.abstract_page for page in holds),
+        influence={row.name: row for row in found.study.influences},
         command=command or "picchio reproduce",
         warnings=warnings,
     )
@@ -79,14 +77,20 @@ def power(value: float) -> str:
 
 
 def _gap(value: float | None) -> str:
-    if value is None:
-        return "–"
-    return "0" if value == 0 else f"{value:.0e}"
+    return "–" if value is None else "0" if value == 0 else f"{value:.0e}"
 
 
 def _value(value: Any) -> str:
-    if isinstance(value, float) and value >= 1e6:
-        return f"{value / 1e9:.4g}e9"
     if isinstance(value, float):
-        return f"{value:.4g}"
+        return f"{value / 1e9:.4g}e9" if value >= 1e6 else f"{value:.4g}"
     return str(value)
+
+
+def _rms(errors: Any, aside: int | None = None) -> float:
+    """Root mean square of errors (k,), one left aside."""
+    return float(np.sqrt((np.delete(errors, [] if aside is None else aside) ** 2).mean()))
+
+
+def _median(errors: Any) -> float:
+    """Median size of errors, those that do not exist left out."""
+    return float(np.nanmedian(np.abs(errors)))

@@ -1,10 +1,11 @@
-"""What the paper prints: one data file, each value with its page."""
+"""What the paper prints, and what is tried of it: two data files, read and checked."""
 
 from __future__ import annotations
 
 import functools
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from pydantic import ConfigDict
@@ -35,13 +36,7 @@ class PrintedArm(StrictModel):
         return np.pi * np.array(self.joint_limits_over_pi)
 
     def inertia(self, link: int, about: str) -> FloatArray:
-        """(3,) kg m^2, a link's inertia about its centre of gravity.
-
-        Args:
-            link: index.
-            about: what Table 1's inertias are taken about: "cg", or "joint", whose share m c^2 is
-                subtracted.
-        """
+        """(3,) kg m^2 about a link's centre of gravity, of inertias about "cg" or "joint"."""
         found, centre = np.array(self.inertias[link]), np.array(self.centres_of_gravity[link])
         if about == "joint" and link > 0:
             found = found - self.masses[link] * (centre @ centre - centre**2)
@@ -67,14 +62,7 @@ class PrintedCurve(StrictModel):
     b: float
 
     def cycles(self, stress: FloatArray) -> FloatArray:
-        """Life at stresses in MPa; inf at none.
-
-        Args:
-            stress: (k,) MPa.
-
-        Returns:
-            (k,) cycles to failure.
-        """
+        """(k,) cycles to failure at stresses (k,) in MPa; inf at none."""
         with np.errstate(divide="ignore"):
             return np.asarray((self.a / np.asarray(stress, dtype=float)) ** (-1.0 / self.b))
 
@@ -84,27 +72,15 @@ class PrintedCurve(StrictModel):
         return -1.0 / self.b
 
     def sn_curve(self, tensile_strength: float | None = None) -> SNCurve:
-        """The same as picchio's own type; Pa.
-
-        Args:
-            tensile_strength: Pa, for a mean-stress correction.
-        """
+        """The same as picchio's own type, Pa; the strength is for a mean-stress correction."""
+        slopes = (self.exponent,)
         return SNCurve(
             name="paper",
             strength=self.a * 1e6,
             cycles=1.0,
-            slopes=(self.exponent,),
+            slopes=slopes,
             tensile_strength=tensile_strength,
         )
-
-
-class PrintedMiner(StrictModel):
-    """Eq. 18's constant: its range, and the value used."""
-
-    page: int
-    least: float
-    most: float
-    used: float
 
 
 class PrintedRow(StrictModel):
@@ -118,18 +94,12 @@ class PrintedRow(StrictModel):
     cycles: Triple
 
 
-class Sentence(StrictModel):
-    """A claim in the paper's words."""
-
-    page: int
-    quote: str
-
-
 class Remark(StrictModel):
-    """Where something stands, and what."""
+    """Where something stands, and what: in our words, or quoted."""
 
     page: int
-    says: str
+    says: str = ""
+    quote: str = ""
 
 
 class Printed(StrictModel):
@@ -143,10 +113,10 @@ class Printed(StrictModel):
     arm: PrintedArm
     task: PrintedTask
     sn_curve: PrintedCurve
-    miner: PrintedMiner
+    miner: dict[str, float]
     table2: tuple[PrintedRow, PrintedRow, PrintedRow]
     equations: dict[str, Remark]
-    claims: dict[str, Sentence]
+    claims: dict[str, Remark]
     slips: tuple[Remark, ...]
 
     @property
@@ -165,12 +135,79 @@ class Printed(StrictModel):
         return np.array([row.force_direction for row in self.table2])
 
 
-def paper_file() -> Path:
-    """The data file."""
-    return Path(str(files("picchio.paper") / "data" / "paper.toml"))
+class Input(StrictModel):
+    """An input that the paper does not report: its range or its choices, and what is known of it.
+
+    `called` names it in a condition; `log` samples the range by its logarithm; what is not
+    `drawn` is the same in all worlds.
+    """
+
+    unit: str = ""
+    why: str
+    called: str = ""
+    low: float | None = None
+    high: float | None = None
+    choices: tuple[Any, ...] = ()
+    log: bool = False
+    drawn: bool = True
+
+    def at(self, share: float) -> Any:
+        """The value at a share, 0 to 1, of the range, or of the list of choices."""
+        if self.low is None or self.high is None:
+            return self.choices[min(int(share * len(self.choices)), len(self.choices) - 1)]
+        if self.log:
+            return float(self.low * (self.high / self.low) ** share)
+        return float(self.low + share * (self.high - self.low))
+
+
+class Test(StrictModel):
+    """How a claim is tried: the number that decides, between two limits or equal to a third.
+
+    `test` and `decides` are templates; `among` are the inputs that the claim can depend on, all
+    if none are named; `worlds` limits in how many it is tried; `condition` is one that the paper
+    does not state; `unknown` is a claim that nothing printed can decide.
+    """
+
+    figure: str = ""
+    test: str
+    decides: str
+    at_least: float = -np.inf
+    at_most: float = np.inf
+    equals: str = "{number}"
+    among: tuple[str, ...] = ()
+    worlds: int | None = None
+    condition: str = ""
+    unknown: bool = False
+
+    def holds(self, number: float, paper: Printed) -> bool:
+        """Whether the number is as the claim wants it."""
+        equal = number == float(self.equals.format(number=number, paper=paper))
+        return equal and self.at_least <= number <= self.at_most
+
+
+class Trials(StrictModel):
+    """The second file: what is tried of the paper, and how it is shown."""
+
+    inputs: dict[str, Input]
+    claims: dict[str, Test]
+    conflicts: dict[str, dict[str, str]]
+    equations: dict[str, dict[str, str]]
+    figures: dict[str, dict[str, Any]]
+    legends: dict[str, str]
+
+
+def paper_file(name: str = "paper.toml") -> Path:
+    """A data file; the first is what the paper prints."""
+    return Path(str(files("picchio.paper") / "data" / name))
 
 
 @functools.cache
 def printed() -> Printed:
     """What the paper prints."""
     return parse_toml(paper_file(), Printed, format=FORMAT)
+
+
+@functools.cache
+def trials() -> Trials:
+    """What is tried of it."""
+    return parse_toml(paper_file("trials.toml"), Trials, format=FORMAT)

@@ -6,26 +6,42 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, ClassVar
 
+import numpy as np
+
 from picchio.core.errors import InputError
 from picchio.core.html import sheet
 from picchio.core.processes import one_thread
 from picchio.core.provenance import provenance
 from picchio.core.results import TableResult
-from picchio.paper.assumptions import INPUTS, Assumptions, parse_assumptions
-from picchio.paper.claims import Tried, try_claims
-from picchio.paper.conflicts import Conflict, conflicts
-from picchio.paper.equations import Equation, equations
-from picchio.paper.figures import all_figures
-from picchio.paper.figures.base import PaperFigure
-from picchio.paper.influence import Influence, influences
-from picchio.paper.printed import paper_file
+from picchio.paper.claims import Finding, Verdict, try_claims
+from picchio.paper.equations import equations
+from picchio.paper.figures import PaperFigure, all_figures
+from picchio.paper.printed import paper_file, trials
 from picchio.paper.study import WORLDS, Study
-from picchio.paper.table2.answer import Answer, answer
-from picchio.paper.verdict import Verdict
-from picchio.paper.waterfall import Step, waterfall
-from picchio.paper.world import World
+from picchio.paper.table2.by_arm import FREE
+from picchio.paper.table2.by_curve import OTHER_CURVE, one_digit_off
+from picchio.paper.world import Assumptions, World, parse_assumptions
 
 FORMAT = "picchio-reproduction/1"
+
+
+@dataclass(frozen=True)
+class Conflict:
+    """Two statements of the paper that cannot both be true.
+
+    Attributes:
+        name: unique.
+        says: what the paper says, with its pages.
+        but: what follows from its own numbers.
+        number: that decides.
+        figure: name of the figure that shows it.
+    """
+
+    name: str
+    says: str
+    but: str
+    number: float
+    figure: str
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -38,8 +54,6 @@ class Reproduction(TableResult):
         conflicts: what does not fit together.
         equations: eqs. 1 to 22.
         figures: by name.
-        steps: the life by each correction.
-        influences: of every unreported input.
         answer: what explains Table 2.
         origin: provenance.
     """
@@ -52,19 +66,17 @@ class Reproduction(TableResult):
     PAGE = "paper.page:reproduction_page"
 
     study: Study
-    claims: tuple[Tried, ...]
+    claims: tuple[Finding, ...]
     conflicts: tuple[Conflict, ...]
-    equations: tuple[Equation, ...]
+    equations: list[dict[str, Any]]
     figures: dict[str, PaperFigure]
-    steps: tuple[Step, ...]
-    influences: tuple[Influence, ...]
-    answer: Answer
+    answer: dict[str, Any]
     origin: dict[str, Any]
 
     @property
     def counts(self) -> dict[str, int]:
         """How many claims got each verdict."""
-        return {str(v): sum(tried.finding.verdict is v for tried in self.claims) for v in Verdict}
+        return {str(v): sum(found.verdict is v for found in self.claims) for v in Verdict}
 
     def world(self, **assume: float | str) -> World:
         """The paper's figures in a world of other assumptions.
@@ -79,47 +91,42 @@ class Reproduction(TableResult):
         return f"{len(self.claims)} claims: {counts}"
 
     def _rows(self) -> list[dict[str, Any]]:
-        return [tried.to_dict() for tried in self.claims]
+        return [{**asdict(found), "verdict": str(found.verdict)} for found in self.claims]
 
     def _repr_html_(self) -> str:
-        rows = [
-            (t.sentence.page, t.sentence.quote, f"{t.finding.verdict} {t.finding.condition}")
-            for t in self.claims
-        ]
+        rows = [(c.page, c.quote, f"{c.verdict} {c.condition or ''}") for c in self.claims]
         columns = ("p.", "claim", "verdict")
         return sheet(self.study.printed.title, None, columns, rows, head=self._headline())
 
     def _content(self) -> dict[str, Any]:
         printed = self.study.printed
+        kept = ("unit", "low", "high", "why")
         return {
             "format": FORMAT,
-            "paper": {"title": printed.title, "journal": printed.journal, "doi": printed.doi},
+            "paper": {key: getattr(printed, key) for key in ("title", "journal", "doi")},
             "assumptions": {
-                entry.name: {
-                    "value": getattr(self.study.given, entry.name),
-                    "unit": entry.unit,
-                    "low": entry.low,
-                    "high": entry.high,
+                name: {
+                    "value": getattr(self.study.given, name),
                     "choices": list(entry.choices) or None,
-                    "why": entry.why,
+                    **{key: getattr(entry, key) for key in kept},
                 }
-                for entry in INPUTS
+                for name, entry in trials().inputs.items()
             },
             "worlds": len(self.study.worlds),
             "counts": self.counts,
             "claims": self._rows(),
-            "conflicts": [asdict(found) for found in self.conflicts],
-            "slips": [slip.model_dump() for slip in printed.slips],
-            "equations": [asdict(equation) for equation in self.equations],
+            "conflicts": self.conflicts,
+            "slips": [{"page": slip.page, "says": slip.says} for slip in printed.slips],
+            "equations": self.equations,
             "table1": {
                 "mass": printed.arm.masses,
                 "centre_of_gravity": printed.arm.centres_of_gravity,
                 "inertia": printed.arm.inertias,
             },
-            "table2": self.answer.to_dict(),
-            "life": [step.to_dict() for step in self.steps],
-            "influence": {entry.name: entry.to_dict() for entry in self.influences},
-            "figures": [figure.to_dict() for figure in self.figures.values()],
+            "table2": self.answer,
+            "life": self.study.steps,
+            "influence": {entry.name: entry for entry in self.study.influences},
+            "figures": list(self.figures.values()),
             "provenance": self.origin,
         }
 
@@ -152,17 +159,62 @@ def reproduce(
         assume = parse_assumptions(f"{name}={value}" for name, value in (assume or {}).items())
     study = Study(assume, worlds, seed, progress)
     _ = study.base.rivet_poses, study.base.path_poses  # what is out of reach is said at once
-    steps = waterfall(study.base)
-    claims = try_claims(study)
-    figures = {figure.name: figure for figure in all_figures(study, steps)}
+    figures = all_figures(study)
     return Reproduction(
         study=study,
-        claims=claims,
-        conflicts=tuple(conflicts(study, figures)),
+        claims=try_claims(study),
+        conflicts=conflicts(figures),
         equations=equations(study),
         figures=figures,
-        steps=steps,
-        influences=influences(study),
         answer=answer(study),
         origin=provenance([paper_file()], seed=seed),
     )
+
+
+def conflicts(figures: Mapping[str, PaperFigure]) -> tuple[Conflict, ...]:
+    """What does not fit together, by the numbers of the figures that show it."""
+    found = []
+    for name, entry in trials().conflicts.items():
+        words = figures[entry["figure"]].words
+        key, _, index = entry["number"].partition(".")
+        number = float(words[key][int(index)] if index else words[key])
+        says, but = entry["says"].format(**words), entry["but"].format(**words)
+        found.append(Conflict(name, says, but, number, entry["figure"]))
+    return tuple(found)
+
+
+def answer(study: Study) -> dict[str, Any]:
+    """What explains Table 2, how certainly, and what remains unknown.
+
+    `lead` is how much better, in the criterion, the best is than the best that keeps the printed
+    curve; `crossing` is where the two curves meet; `shared_variance` is b of the one over that of
+    the other: r^2 of a scatter of points of which they would be the two regression lines; `alike`
+    are the ranges of the inputs among worlds that fit the means about as well.
+    """
+    table, comparison, printed = study.curve_of_table, study.comparison, study.printed.sn_curve
+    a, b = table.other.values["a"], table.other.values["b"]
+    cycles = (a / printed.a) ** (1.0 / (printed.b - b))
+    base = study.base.rivet_stress.mean(axis=1)
+    keeps = min(f.bic for f in table.fits if f.name != OTHER_CURVE)
+    kept = next(h for h in comparison.hypotheses if not h.fit.rule.free_exponent)
+    worlds = [f.world for f in comparison.alike if f.cost < 2.0 * comparison.alike[0].cost]
+    ranges = {n: [float(w[n]) for w in worlds] for n in (*FREE, "stress_per_twist")}
+    return {
+        "base_mean_stress": base,
+        "base_cycles": printed.cycles(base),
+        "fitted_mean_stress": np.asarray(study.fitted.rivet_stress.mean(axis=1)),
+        "curve": table.other,
+        "misprint": {
+            "entry": table.misprint,
+            "factor": table.misprint_factor,
+            "nearest_digit": one_digit_off(table),
+        },
+        "lead": {
+            "entries_alone": keeps - table.other.bic,
+            "with_the_arm": kept.bic - comparison.hypotheses[0].bic,
+        },
+        "crossing": {"cycles": cycles, "stress": printed.a * cycles**printed.b},
+        "shared_variance": printed.b / b,
+        "hypotheses": comparison.hypotheses,
+        "alike": {name: (min(values), max(values)) for name, values in ranges.items()},
+    }

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
-from picchio.paper.assumptions import Assumptions
+from picchio.paper.equations import check_phase
+from picchio.paper.life import Influence, Sequences, Step, find_sequences, influences, waterfall
 from picchio.paper.printed import Printed, printed
+from picchio.paper.table2.by_arm import FREE, Comparison, compare_hypotheses, decode
 from picchio.paper.table2.by_curve import CurveOfTable, curve_of_table
-from picchio.paper.table2.compare import Comparison, compare_hypotheses
-from picchio.paper.table2.place import FREE, decode
-from picchio.paper.world import World, random_worlds
+from picchio.paper.world import Assumptions, World, random_worlds
 
 WORLDS = 160
 """How many worlds are drawn beside the base."""
@@ -25,27 +26,46 @@ class Study:
         given: the base world's assumptions.
         count: worlds drawn beside it.
         seed: of the draw.
+        progress: called with (steps done, steps in all).
+        printed: what the paper prints.
     """
 
     given: Assumptions
     count: int = WORLDS
     seed: int = 0
     progress: Callable[[int, int], None] | None = None
-
-    @property
-    def printed(self) -> Printed:
-        """What the paper prints."""
-        return printed()
+    printed: Printed = field(default_factory=printed)
 
     @cached_property
     def base(self) -> World:
         """The world of the given assumptions."""
-        return World(self.given, fine=True)
+        return World(self.given, self.printed, fine=True)
 
     @cached_property
     def worlds(self) -> tuple[World, ...]:
         """The base, and random others."""
-        return (self.base, *random_worlds(self.count, self.seed, self.given))
+        others = random_worlds(self.count, self.seed, self.given, self.printed)
+        return (self.base, *others)
+
+    @cached_property
+    def phase(self) -> dict[str, Any]:
+        """Eq. 13's phase in the base world, as written and as meant."""
+        return check_phase(self.base)
+
+    @cached_property
+    def steps(self) -> tuple[Step, ...]:
+        """The life of the paper's task, by each correction of its method."""
+        return waterfall(self.base)
+
+    @cached_property
+    def influences(self) -> tuple[Influence, ...]:
+        """Of every unreported input on the life, the largest first."""
+        return influences(self.given, self.printed)
+
+    @cached_property
+    def sequences(self) -> Sequences:
+        """Worlds in which the joints dominate as Fig. 9 has it."""
+        return find_sequences(self.given, self.seed, self.printed)
 
     @cached_property
     def curve_of_table(self) -> CurveOfTable:
@@ -53,13 +73,14 @@ class Study:
         return curve_of_table(self.printed)
 
     @cached_property
+    def comparison(self) -> Comparison:
+        """The hypotheses of Table 2, with the arm."""
+        return compare_hypotheses(self.printed, self.given, self.progress)
+
+    @cached_property
     def fitted(self) -> World:
         """The world that comes nearest to Table 2's eight mean stresses."""
         fit = self.comparison.alike[0]
         values = decode(fit.vector[: len(FREE)])
-        return World(fit.place.base.but(**values, stress_per_twist=fit.stress_per_twist))
-
-    @cached_property
-    def comparison(self) -> Comparison:
-        """The hypotheses of Table 2, with the arm."""
-        return compare_hypotheses(self.printed, self.given, self.progress)
+        given = fit.place.base.but(**values, stress_per_twist=fit.stress_per_twist)
+        return World(given, self.printed)

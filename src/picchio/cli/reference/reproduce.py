@@ -45,8 +45,8 @@ def reproduce(
     report is assumed; a claim that depends on it is tried with many sets of assumptions.
     """
     import picchio
-    from picchio.paper.assumptions import parse_assumptions
     from picchio.paper.study import WORLDS
+    from picchio.paper.world import parse_assumptions
 
     given = parse_assumptions(assume or [])
     with progress("hypotheses about Table 2") as told:
@@ -59,19 +59,19 @@ def _show(found: Reproduction) -> None:
     screen = console()
     printed = found.study.printed
     screen.print(f"{found._headline()}.", style="bold")
-    lives = found.answer.table
+    lives = found.study.curve_of_table
     values, longer = lives.other.values, lives.over_printed
     screen.print(
         f"Table 2's lives are {longer.min():.3g} to {longer.max():.3g} times shorter than the "
         f"printed curve's; S = {values['a']:,.0f} N^{values['b']:.4f} at the same mean stresses "
-        f"gives seven of eight within {100 * lives.within:.2g} %."
+        f"gives seven of eight within {lives.within:.2g} %."
     )
     screen.print(f"{printed.title}, {printed.journal}")
     colour = {"holds": "green", "holds only if": "yellow", "does not hold": "red",
               "cannot be known": "dim"}  # fmt: skip
     rows = []
     for tried in found.claims:
-        mark = str(tried.finding.verdict)
-        told = styled(mark, f" {tried.finding.condition}", style=colour[mark])
-        rows.append((told, str(tried.sentence.page), tried.sentence.quote))
+        mark = str(tried.verdict)
+        told = styled(mark, f" {tried.condition or ''}", style=colour[mark])
+        rows.append((told, str(tried.page), tried.quote))
     screen.print(table(("verdict", ">p.", "claim"), rows, ruled=False))

@@ -1,1 +1,1 @@
-"""Table 2: what its numbers follow from."""
+"""Table 2: how its lives follow from its stresses, without an arm and with one."""

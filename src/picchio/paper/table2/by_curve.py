@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -31,32 +30,18 @@ class CurveFit:
         parameters: how many numbers were fitted, the misprint included, the error not.
         values: them.
         residuals: (8,) ln of printed over predicted N.
-        aside: index of the entry set aside, or None.
-        error: standard deviation of ln N beyond rounding.
+        set_aside: index of the entry set aside, or None.
         bic: Bayesian information criterion, less is better.
-        left_out: (8,) ln error of each entry predicted from the others; NaN for the one aside.
+        left_out_median: of |ln error| of each entry predicted from the others.
     """
 
     name: str
     parameters: int
     values: dict[str, float]
     residuals: FloatArray
-    aside: int | None
-    error: float
+    set_aside: int | None
     bic: float
-    left_out: FloatArray
-
-    def to_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return {
-            "name": self.name,
-            "parameters": self.parameters,
-            "values": self.values,
-            "residuals": self.residuals,
-            "set_aside": self.aside,
-            "bic": self.bic,
-            "left_out_median": float(np.nanmedian(np.abs(self.left_out))),
-        }
+    left_out_median: float
 
 
 @dataclass(frozen=True)
@@ -79,13 +64,8 @@ class CurveOfTable:
     rounding: FloatArray
 
     def fit(self, name: str, aside: bool = False) -> CurveFit:
-        """A hypothesis by its name, with or without an entry aside.
-
-        Args:
-            name: of the hypothesis.
-            aside: whether an entry of the table is left out.
-        """
-        return next(f for f in self.fits if f.name == name and (f.aside is not None) == aside)
+        """A hypothesis by its name, with or without an entry aside."""
+        return next(f for f in self.fits if f.name == name and (f.set_aside is not None) == aside)
 
     @property
     def other(self) -> CurveFit:
@@ -93,31 +73,32 @@ class CurveOfTable:
         return self.fit(OTHER_CURVE, aside=True)
 
     @property
+    def aside(self) -> int:
+        """Index of the entry that no curve through the others meets."""
+        assert self.other.set_aside is not None
+        return self.other.set_aside
+
+    @property
     def misprint(self) -> str:
-        """The entry that no curve through the others meets."""
-        assert self.other.aside is not None
-        return self.labels[self.other.aside]
+        """That entry."""
+        return self.labels[self.aside]
 
     @property
     def misprint_factor(self) -> float:
         """How far it is off."""
-        assert self.other.aside is not None
-        return math.exp(abs(float(self.other.residuals[self.other.aside])))
+        return math.exp(abs(float(self.other.residuals[self.aside])))
 
     @property
     def within(self) -> float:
-        """Largest relative error of the entries on the other curve."""
-        assert self.other.aside is not None
-        return float(np.abs(np.delete(self.other.residuals, self.other.aside)).max())
+        """Largest relative error of the other entries on the other curve, in per cent."""
+        return 100 * float(np.abs(np.delete(self.other.residuals, self.aside)).max())
 
 
-Hypothesis = tuple[
-    str, int, Callable[[FloatArray, FloatArray], tuple[FloatArray, dict[str, float]]]
-]
+Hypothesis = Callable[[FloatArray, FloatArray], tuple[FloatArray, dict[str, float]]]
 
 
-def hypotheses(printed: Printed) -> list[Hypothesis]:
-    """What ln N may be at a stress: each a name, its parameters, and its fit.
+def hypotheses(printed: Printed) -> dict[str, Hypothesis]:
+    """What ln N may be at a stress: by name, a fit.
 
     A fit takes ln S and ln N and gives a polynomial in ln S and the fitted values by name.
     """
@@ -128,42 +109,41 @@ def hypotheses(printed: Printed) -> list[Hypothesis]:
         shift = float((level - m * s - n).mean())
         return np.array([-m, level - shift]), {"factor": math.exp(shift)}
 
-    def strength(s: FloatArray, n: FloatArray) -> tuple[FloatArray, dict[str, float]]:
+    def other(s: FloatArray, n: FloatArray) -> tuple[FloatArray, dict[str, float]]:
         slope, start = np.polyfit(s, n, 1)
-        return np.array([slope, start]), {
-            "a": math.exp(-start / slope), "b": 1.0 / slope, "exponent": -slope,
-        }  # fmt: skip
+        values = {"a": math.exp(-start / slope), "b": 1.0 / slope, "exponent": -slope}
+        return np.array([slope, start]), values
 
-    return [
-        ("the curve as printed", 0, lambda s, n: (np.array([-m, level]), {})),
-        ("as printed, rivets for hits", 0, lambda s, n: (np.array([-m, level - hits]), {})),
-        ("as printed, times a factor", 1, factor),
-        (OTHER_CURVE, 2, strength),
-    ]
+    return {
+        "the curve as printed": lambda s, n: (np.array([-m, level]), {}),
+        "as printed, rivets for hits": lambda s, n: (np.array([-m, level - hits]), {}),
+        "as printed, times a factor": factor,
+        OTHER_CURVE: other,
+    }
+
+
+_PARAMETERS = (0, 0, 1, 2)  # that each of them fits
 
 
 def curve_of_table(printed: Printed) -> CurveOfTable:
     """Compare the hypotheses on Table 2's eight finite entries."""
-    stress, cycles = printed.stress, printed.cycles
-    finite = np.isfinite(cycles)
-    labels = tuple(
-        f"{row.direction}, joint {j + 1}"
-        for row, ok in zip(printed.table2, finite, strict=True)
-        for j in range(3)
-        if ok[j]
-    )
-    s, n = np.log(stress[finite]), np.log(cycles[finite])
-    rounding = rounding_of(stress[finite], cycles[finite], printed.sn_curve.exponent)
+    finite = np.isfinite(printed.cycles)
+    labels = tuple(f"{printed.table2[d].direction}, joint {j + 1}" for d, j in np.argwhere(finite))
+    stress, cycles = printed.stress[finite], printed.cycles[finite]
+    rounding = rounding_of(stress, cycles, printed.sn_curve.exponent)
     fits = [
-        _fit(entry, s, n, rounding, aside)
-        for entry in hypotheses(printed)
+        _fit(name, count, fit, np.log(stress), np.log(cycles), rounding, aside)
+        for (name, fit), count in zip(hypotheses(printed).items(), _PARAMETERS, strict=True)
         for aside in (False, True)
     ]
     return CurveOfTable(
-        stress[finite], cycles[finite], labels,
-        printed.sn_curve.cycles(stress[finite]) / cycles[finite],
-        tuple(sorted(fits, key=lambda f: f.bic)), rounding,
-    )  # fmt: skip
+        stress,
+        cycles,
+        labels,
+        printed.sn_curve.cycles(stress) / cycles,
+        tuple(sorted(fits, key=lambda f: f.bic)),
+        rounding,
+    )
 
 
 def rounding_of(stress: FloatArray, cycles: FloatArray, exponent: float) -> FloatArray:
@@ -173,41 +153,37 @@ def rounding_of(stress: FloatArray, cycles: FloatArray, exponent: float) -> Floa
 
 
 def _fit(
-    hypothesis: Hypothesis, s: FloatArray, n: FloatArray, rounding: FloatArray, aside: bool
+    name: str,
+    count: int,
+    fit: Hypothesis,
+    s: FloatArray,
+    n: FloatArray,
+    rounding: FloatArray,
+    aside: bool,
 ) -> CurveFit:
-    name, count, fit = hypothesis
     every = np.arange(s.size)
 
     def cost(out: int) -> float:
         rest = np.delete(every, out)
-        line, _ = fit(s[rest], n[rest])
-        return float(((n - np.polyval(line, s))[rest] ** 2).sum())
+        return float(((n - np.polyval(fit(s[rest], n[rest])[0], s))[rest] ** 2).sum())
 
     gone = min(map(int, every), key=cost) if aside else None
     kept = every if gone is None else np.delete(every, gone)
     line, values = fit(s[kept], n[kept])
     residuals = n - np.polyval(line, s)
-    # A rounded number is uniform within its half digit.
+    # A rounded number is uniform within its half digit; the least error beyond that is likeliest.
     known = rounding[kept] ** 2 / 3.0
-    error = likely_error(residuals[kept], known)
-    minus2 = minus_two_ln_likelihood(residuals[kept], known + error**2)
-    if gone is not None:
-        # The misprint is off by anything up to `_OUT` either way.
+    beyond = np.concatenate([[0.0], np.geomspace(1e-5, 10.0, 400)])
+    minus2 = min(minus_two_ln_likelihood(residuals[kept], known + t**2) for t in beyond)
+    if gone is not None:  # it is off by anything up to `_OUT` either way
         minus2 += 2.0 * math.log(2.0 * _OUT)
-    parameters = count + aside
-    left_out = np.full(s.size, np.nan)
+    left_out = []
     for k in kept:
         rest = kept[kept != k]
-        left_out[k] = n[k] - np.polyval(fit(s[rest], n[rest])[0], s[k])
-    return CurveFit(name, parameters, values, residuals, gone, error,
-                    minus2 + penalty(parameters + 1, s.size), left_out)  # fmt: skip
-
-
-def likely_error(residuals: FloatArray, known: FloatArray) -> float:
-    """The standard deviation, beyond a known variance, that makes residuals most likely."""
-    trials = np.concatenate([[0.0], np.geomspace(1e-5, 10.0, 400)])
-    costs = [minus_two_ln_likelihood(residuals, known + t**2) for t in trials]
-    return float(trials[int(np.argmin(costs))])
+        left_out.append(abs(n[k] - np.polyval(fit(s[rest], n[rest])[0], s[k])))
+    parameters = count + aside
+    bic = minus2 + penalty(parameters + 1, s.size)
+    return CurveFit(name, parameters, values, residuals, gone, bic, float(np.median(left_out)))
 
 
 def minus_two_ln_likelihood(residuals: FloatArray, variance: FloatArray) -> float:
@@ -218,3 +194,20 @@ def minus_two_ln_likelihood(residuals: FloatArray, variance: FloatArray) -> floa
 def penalty(parameters: int, entries: int) -> float:
     """Of the Bayesian information criterion (Schwarz 1978)."""
     return parameters * math.log(entries)
+
+
+def one_digit_off(curve: CurveOfTable) -> tuple[str, str, float]:
+    """The change of one digit that comes nearest to the curve: to, from, ln N that is left."""
+    a, b = curve.other.values["a"], curve.other.values["b"]
+    stress, cycles = f"{curve.stress[curve.aside]:.2f}", f"{curve.cycles[curve.aside]:.2e}"
+    trials = []
+    for text in (stress, cycles):
+        for i, old in enumerate(text.partition("e")[0]):
+            for new in "0123456789":
+                other = text[:i] + new + text[i + 1 :]
+                if old.isdigit() and new != old and float(other) > 0.0:
+                    s = float(other if text is stress else stress)
+                    n = float(other if text is cycles else cycles)
+                    trials.append((abs(math.log(n) - math.log(s / a) / b), other, text))
+    off, other, text = min(trials)
+    return other, text, off
