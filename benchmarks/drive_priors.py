@@ -22,10 +22,12 @@ from itertools import combinations
 from pathlib import Path
 from typing import Any
 
+import drive_fit
 import numpy as np
+from drive_fit import MeasuredRobot
 
 from picchio.core.files import atomic_write
-from picchio.robot.drives import facts
+from picchio.robot.drives.facts import stiffness_beside
 from picchio.robot.drives.hierarchy import Draws, predict
 from picchio.robot.drives.predictors import OF_STIFFNESS, QUANTITIES
 from picchio.robot.drives.priors import Mixture, moments, probability_below, quantiles
@@ -42,7 +44,7 @@ class Left:
     Its truth, the estimate and its 90 % interval, ln N m/rad; whether it is in; log densities.
     """
 
-    robot: facts.MeasuredRobot
+    robot: MeasuredRobot
     rows: np.ndarray
     truth: np.ndarray
     estimate: np.ndarray
@@ -68,19 +70,19 @@ def log_density(mixture: Mixture, point: np.ndarray) -> float:
     return float(np.logaddexp.reduce(fits))
 
 
-def foretold(draws: Sequence[Draws], robot: facts.MeasuredRobot, kept: Names) -> Mixture:
+def foretold(draws: Sequence[Draws], robot: MeasuredRobot, kept: Names) -> Mixture:
     """The stiffness of a robot's measured joints, ln N m/rad, by fits to others.
 
     Several chains are pooled: the more of them, the less is left to chance.
     """
     rows = np.flatnonzero(np.isfinite(robot.truth))
-    group = replace(facts.stiffness_beside(robot.group, kept), kind=None)
+    group = replace(stiffness_beside(robot.group, kept), kind=None)
     columns = zip(*(predict(each, group) for each in draws), strict=True)
     weights, means, covs = (np.concatenate(column) for column in columns)
     return weights / len(draws), means[:, rows], covs[:, rows][:, :, rows]
 
 
-def nested(robots: list[facts.MeasuredRobot]) -> None:
+def nested(robots: list[MeasuredRobot]) -> None:
     """For each robot left out: which predictors the others choose, by leaving out one of them."""
     names = {"stiffness": OF_STIFFNESS, "every": QUANTITIES}
     measured = [k for k, robot in enumerate(robots) if np.isfinite(robot.truth).any()]
@@ -88,7 +90,7 @@ def nested(robots: list[facts.MeasuredRobot]) -> None:
     for pair in combinations(measured, 2):
         others = [one for i, one in enumerate(robots) if i not in pair]
         for name, kept in names.items():
-            draws = [facts.fit_stiffness(others, kept)]
+            draws = [drive_fit.fit_stiffness(others, kept)]
             for out, left in (pair, pair[::-1]):
                 truth = robots[left].truth[np.isfinite(robots[left].truth)]
                 inner[name][out] += log_density(foretold(draws, robots[left], kept), truth)
@@ -101,14 +103,14 @@ def nested(robots: list[facts.MeasuredRobot]) -> None:
     print(f"chosen: {OF_STIFFNESS} by {chosen.count('stiffness')} of {len(chosen)}")
 
 
-def leave_one_out(robots: list[facts.MeasuredRobot], kept: Names, chains: int = 1) -> list[Left]:
+def leave_one_out(robots: list[MeasuredRobot], kept: Names, chains: int = 1) -> list[Left]:
     found = []
     for k, robot in enumerate(robots):
         rows = np.flatnonzero(np.isfinite(robot.truth))
         if not len(rows):
             continue
         others = [one for i, one in enumerate(robots) if i != k]
-        draws = [facts.fit_stiffness(others, kept, seed) for seed in range(chains)]
+        draws = [drive_fit.fit_stiffness(others, kept, seed) for seed in range(chains)]
         mixture = foretold(draws, robot, kept)
         weights = mixture[0]
         truth = robot.truth[rows]
@@ -153,11 +155,11 @@ def main() -> None:
     parser.add_argument("--chains", type=int, default=1, help="pooled in every fit")
     parser.add_argument("--json", type=Path, help="write what is printed")
     options = parser.parse_args()
-    robots = facts.measured_robots(load)
+    robots = drive_fit.measured_robots(load)
     if options.refit:
-        path = Path(facts.__file__).parent / "stiffness" / "fitted.json"
+        path = drive_fit.FOLDER / "fitted.json"
         with atomic_write(path) as file:
-            file.write(facts.to_json(facts.refit(robots)))
+            file.write(drive_fit.to_json(drive_fit.refit(robots)))
         print(f"{path}: fitted to {len(robots)} robots")
         return
     if options.nested:

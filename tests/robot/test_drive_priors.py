@@ -2,19 +2,23 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from picchio.core.errors import InputError
-from picchio.robot.drives import facts
-from picchio.robot.drives.hierarchy import Group, fit, predict
+from picchio.robot.drives.hierarchy import Group, predict
 from picchio.robot.drives.predictors import QUANTITIES, places, predictors
 from picchio.robot.drives.priors import drive_priors, moments, quantiles, with_reducer
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.loading.load import load_robot
 from picchio.robot.spread import root_of
+
+sys.path.append(str(Path(__file__).resolve().parents[2] / "benchmarks"))
+drive_fit = pytest.importorskip("drive_fit", reason="the benchmarks are not here")
 
 
 @cache
@@ -23,12 +27,12 @@ def arm(name: str) -> FlexibleRobot:
 
 
 def test_the_shipped_fit_is_of_the_shipped_facts() -> None:
-    folder = facts._folder()
-    assert json.loads((folder / "fitted.json").read_text())["facts"] == facts.facts_hash()
+    shipped = json.loads((drive_fit.FOLDER / "fitted.json").read_text())
+    assert shipped["facts"] == drive_fit.facts_hash()
 
 
 def test_facts_say_where_they_are_from_and_no_estimate_is_truth() -> None:
-    robots = {robot.name: robot for robot in facts.measured_robots(arm)}
+    robots = {robot.name: robot for robot in drive_fit.measured_robots(arm)}
     assert all(robot.source for robot in robots.values())
     assert all(robot.evidence for robot in robots.values() if np.isfinite(robot.truth).any())
     assert not np.isfinite(robots["Kinova Gen3"].truth).any()
@@ -62,7 +66,7 @@ def test_the_fit_finds_what_made_the_data_and_its_ranges_hold() -> None:
         values = level + joint * np.array([0.5, 0.8, 0.0]) + noise
         values[rng.random((6, 3)) < 0.2] = np.nan
         groups.append(Group(values, places(6), np.zeros(6, dtype=np.intp)))
-    draws = fit(groups[:40], draws=40, sweeps=400)
+    draws = drive_fit.fit(groups[:40], draws=40, sweeps=400)
     assert np.median(np.abs(draws.size), axis=0) == pytest.approx([2.0, 2.0, 0.5], rel=0.5)
     inside, away = [], []
     for group in groups[40:]:
