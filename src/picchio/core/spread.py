@@ -11,6 +11,7 @@ from functools import partial
 from typing import Any, TypeVar
 
 from picchio.core.errors import InputError
+from picchio.core.extras import need
 from picchio.core.workers import as_done
 
 Part = TypeVar("Part")
@@ -75,8 +76,9 @@ def require_scheduler(address: str) -> None:
         address: such as "tcp://host:8786".
 
     Raises:
-        InputError: none does.
+        InputError: none does, or dask is not installed.
     """
+    need("distributed", "dask schedulers", "cluster")
     from distributed.comm.core import connect
     from distributed.security import Security
 

@@ -5,14 +5,12 @@ from __future__ import annotations
 import io
 import warnings
 from collections.abc import Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 
-from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.core.files import swap_in, writing
 from picchio.core.unfinished import remove, unfinished
@@ -25,7 +23,7 @@ _ROWS = 65536
 _CHUNK = 4096
 # How pieces of a Zarr store are packed: bits of one place beside each other, as numbers of a map
 # differ in the last ones only. Zarr's own choice takes several times as long, and more room.
-_PACKED: dict[str, Any] = {"cname": "lz4", "clevel": 1}
+_PACKED: dict[str, Any] = {"cname": "lz4", "clevel": 1, "shuffle": "bitshuffle"}
 
 # Variable: (dimensions, unit, what it is).
 VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
@@ -207,66 +205,45 @@ class _KeptError(io.FileIO):
 
 
 class _ZarrWriter:
-    """A store that xarray lays out; its pieces are written as the files that they are.
-
-    By way of Zarr, each waits many times for a thread to run, which takes three times as long where
-    the cores are busy.
-    """
+    """A store that xarray lays out and Zarr fills, a block of rows at a time."""
 
     def __init__(self, path: Path, labels: Columns, attributes: dict[str, Any]) -> None:
         self._path, self._labels, self._attributes = path, labels, attributes
-        self._arrays: dict[str, Any] = {}
+        self._group: Any = None
         self._rows = 0
 
     def append(self, columns: Columns) -> None:
-        if not self._arrays:
+        import zarr
+
+        if self._group is None:
             self._prepare(columns)
-        with ThreadPoolExecutor() as pool:
-            for done in [pool.submit(self._piece, *column) for column in columns.items()]:
-                done.result()
-        self._rows += len(columns["place"])
+            self._group = zarr.open_group(self._path, mode="r+")
+        first, self._rows = self._rows, self._rows + len(columns["place"])
+        for name, values in columns.items():
+            self._group[name].resize((self._rows, *values.shape[1:]))
+            self._group[name][first:] = values
 
     def _prepare(self, columns: Columns) -> None:
         """Without any row."""
         import xarray
-        import zarr
         from zarr.codecs import BloscCodec
 
-        data = {}
+        data, pieces = {}, {}
+        codec = BloscCodec(**_PACKED)
         for name, values in columns.items():
             dims, unit, meaning = VARIABLES[name]
             data[name] = (dims, values[:0], {"units": unit, "long_name": meaning})
-        codec = BloscCodec(**_PACKED, shuffle="bitshuffle")
-        pieces = {
-            name: {"chunks": (_ROWS, *(columns[name].shape[1:])), "compressors": (codec,)}
-            for name in data
-        }
+            pieces[name] = {"chunks": (_ROWS, *values.shape[1:]), "compressors": (codec,)}
         empty = xarray.Dataset(data, coords=self._labels, attrs=self._attributes)
         empty.to_zarr(self._path, mode="w", consolidated=False, encoding=pieces)
-        group = zarr.open_group(self._path, mode="r+")
-        self._arrays = {name: group[name] for name in data}
-
-    def _piece(self, name: str, values: FloatArray) -> None:
-        from numcodecs import Blosc
-
-        one = (self._rows // _ROWS, *(0 for _ in values.shape[1:]))
-        file = self._path / name / self._arrays[name].metadata.encode_chunk_key(one)
-        file.parent.mkdir(parents=True, exist_ok=True)
-        # A piece is whole, though nothing of it is read beyond the last row.
-        beyond = np.zeros((_ROWS - len(values), *values.shape[1:]), values.dtype)
-        whole = np.concatenate([values, beyond]) if len(beyond) else values
-        plain = np.ascontiguousarray(whole, values.dtype.newbyteorder("<"))
-        file.write_bytes(Blosc(**_PACKED, shuffle=Blosc.BITSHUFFLE).encode(plain))
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if kind is None and self._arrays:
+        if kind is None and self._group is not None:
             import zarr
 
-            for array in self._arrays.values():
-                array.resize((self._rows, *array.shape[1:]))
             with warnings.catch_warnings():
                 # Zarr 3 has consolidated metadata ahead of its own specification.
                 warnings.simplefilter("ignore")

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from picchio.core.errors import InputError, OutputError
+from picchio.core.extras import need
 from picchio.core.files import atomic_write, locked, temporary_folder, write_text, writing
 from picchio.core.processes import one_thread
 from picchio.core.provenance import provenance
@@ -109,6 +110,8 @@ def workspace_map(
     target = Path(out) if out is not None else temporary_folder() / "map.nc"
     if target.suffix not in ENDINGS:
         raise InputError("unknown ending", key="out", value=target.name, choices=ENDINGS)
+    if target.suffix == ".zarr":
+        need("zarr", "Zarr stores", "zarr")
     if not target.parent.is_dir():
         raise InputError("the folder does not exist", file=target)
     need_springs(robot)

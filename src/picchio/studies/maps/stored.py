@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from picchio.core.errors import InputError
+from picchio.core.extras import need
 from picchio.core.files import regular_file
 
 if TYPE_CHECKING:
@@ -37,6 +38,8 @@ def open_map(path: str | Path) -> xarray.Dataset:
         regular_file(target)
     elif not target.exists():
         raise InputError("no such file", file=target)
+    else:
+        need("zarr", "Zarr stores", "zarr")
     try:
         if target.suffix == ".zarr":
             found = xarray.open_zarr(target, consolidated=False)
