@@ -36,7 +36,13 @@ class PrintedArm(StrictModel):
         return np.pi * np.array(self.joint_limits_over_pi)
 
     def inertia(self, link: int, about: str) -> FloatArray:
-        """(3,) kg m^2 about a link's centre of gravity, of inertias about "cg" or "joint"."""
+        """(3,) kg m^2, a link's inertia about its centre of gravity.
+
+        Args:
+            link: index.
+            about: what Table 1's inertias are taken about: "cg", or "joint", whose share m c^2 is
+                subtracted.
+        """
         found, centre = np.array(self.inertias[link]), np.array(self.centres_of_gravity[link])
         if about == "joint" and link > 0:
             found = found - self.masses[link] * (centre @ centre - centre**2)
@@ -62,7 +68,11 @@ class PrintedCurve(StrictModel):
     b: float
 
     def cycles(self, stress: FloatArray) -> FloatArray:
-        """(k,) cycles to failure at stresses (k,) in MPa; inf at none."""
+        """(k,) cycles to failure; inf where there is no stress.
+
+        Args:
+            stress: (k,) MPa.
+        """
         with np.errstate(divide="ignore"):
             return np.asarray((self.a / np.asarray(stress, dtype=float)) ** (-1.0 / self.b))
 
@@ -72,7 +82,11 @@ class PrintedCurve(StrictModel):
         return -1.0 / self.b
 
     def sn_curve(self, tensile_strength: float | None = None) -> SNCurve:
-        """The same as picchio's own type, Pa; the strength is for a mean-stress correction."""
+        """The same as picchio's own type, Pa.
+
+        Args:
+            tensile_strength: Pa, for a mean-stress correction.
+        """
         slopes = (self.exponent,)
         return SNCurve(
             name="paper",

@@ -63,7 +63,11 @@ class Assumptions:
         return self.duty * self.period
 
     def but(self, **changes: Any) -> Assumptions:
-        """The same with some values changed: attribute = value."""
+        """The same with some values changed.
+
+        Args:
+            changes: attribute = value.
+        """
         return dataclasses.replace(self, **changes)
 
 
@@ -198,7 +202,12 @@ class ReachMap:
         return float(max(peaks[0].max(), peaks[-1].max()) / peaks[len(peaks) // 2].max())
 
     def top(self, along: str, joint: int) -> FloatArray:
-        """The place (3,) m where the joint's peak is largest."""
+        """The place (3,) m where a joint's peak is largest.
+
+        Args:
+            along: "worst", or the force's axis.
+            joint: its index.
+        """
         return np.asarray(self.place.reshape(-1, 3)[int(self.peaks[along][..., joint].argmax())])
 
 
@@ -234,12 +243,25 @@ class World:
     def peaks(
         self, poses: ArrayLike, direction: ArrayLike | None = None, hits: int | None = None
     ) -> BatchPeaks:
-        """Peaks at poses (p, 3) rad: the worst direction's where None; steady, or of a burst."""
+        """Peaks at poses: the worst direction's, or along one; steady, or of a burst.
+
+        Args:
+            poses: (p, 3) rad.
+            direction: (3,) of the force; the worst one where None.
+            hits: of a burst from rest; None for a steady train.
+
+        Returns:
+            deflections and torques, (p, 3) each.
+        """
         rows = np.ascontiguousarray(poses, dtype=float)
         return peaks_at(self.model, rows, self.blows, hits=hits, direction=direction)[0]
 
     def stress(self, deflection: FloatArray) -> FloatArray:
-        """The shear stress in MPa of deflections in rad, any shape, by eqs. 14-17."""
+        """The shear stress in MPa, by eqs. 14-17.
+
+        Args:
+            deflection: rad, any shape.
+        """
         return np.asarray(deflection) * (self.given.stress_per_twist / 1e6)
 
     @cached_property
@@ -268,9 +290,14 @@ class World:
         return self.peaks(self.path_poses)
 
     def path_radii(self, angle: FloatArray, towards: ArrayLike = (0.0, 0.0, 1.0)) -> FloatArray:
-        """Peaks on the vertical path under forces from +x by angles (k,) rad towards a direction.
+        """Peaks on the vertical path under forces from +x by some angles towards a direction.
 
-        The direction (3,) is square to x. (k, 4 poses, 3 joints) rad.
+        Args:
+            angle: (k,) rad.
+            towards: (3,), square to x.
+
+        Returns:
+            (k, 4 poses, 3 joints) rad.
         """
         x = (1.0, 0.0, 0.0)
         cut = np.outer(np.cos(angle), x) + np.outer(np.sin(angle), np.asarray(towards))
@@ -312,7 +339,11 @@ class World:
         )
 
     def rivet_peaks(self, hits: int | None = None) -> FloatArray:
-        """Largest deflections at the rivets, (3 directions, 15 rivets, 3 joints) rad."""
+        """Largest deflections at the rivets, (3 directions, 15 rivets, 3 joints) rad.
+
+        Args:
+            hits: of a burst from rest; None for the steady state.
+        """
         directions = self.printed.directions
         return np.array([self.peaks(self.rivet_poses, n, hits).peak_deflection for n in directions])
 
@@ -328,7 +359,7 @@ class World:
         return int(d), int(k), int(j)
 
     @cached_property
-    def at_worst(self) -> tuple[ModelAtPose, FloatArray, int]:
+    def at_worst(self) -> tuple[Any, FloatArray, int]:
         """The pose, the force's direction (3,) and the joint of the largest stress."""
         d, k, j = self.worst
         return ModelAtPose(self.model, self.rivet_poses[k]), self.printed.directions[d], j

@@ -64,7 +64,12 @@ class CurveOfTable:
     rounding: FloatArray
 
     def fit(self, name: str, aside: bool = False) -> CurveFit:
-        """A hypothesis by its name, with or without an entry aside."""
+        """A hypothesis by its name, with or without an entry aside.
+
+        Args:
+            name: of the hypothesis.
+            aside: whether an entry of the table is left out.
+        """
         return next(f for f in self.fits if f.name == name and (f.set_aside is not None) == aside)
 
     @property
