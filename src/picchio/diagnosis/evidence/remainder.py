@@ -11,6 +11,7 @@ by what it cannot explain.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,7 +31,7 @@ class Left:
     Attributes:
         log_likelihood: nats.
         weight: the mean of 1 / v: by how much less the residual counts.
-        size: the mean of s, of the signal.
+        size: the residual beyond the noise, of the signal.
     """
 
     log_likelihood: float
@@ -58,5 +59,5 @@ def left(square: float, samples: int, signal: float, records: int) -> Left:
     return Left(
         most + float(np.log(total)) - 0.5 * (samples - freedom),
         float(weights @ (1.0 / variance)),
-        float(weights @ _GRID),
+        math.sqrt(max(square - samples, 0.0) / signal) if signal else 0.0,
     )

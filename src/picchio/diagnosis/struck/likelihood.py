@@ -105,6 +105,14 @@ class Data:
         every = self.problem.records
         return every if self.chosen is None else [every[k] for k in self.chosen]
 
+    @property
+    def one_a_pose(self) -> list[int]:
+        """A record of each pose, each of another direction."""
+        by_pose: dict[int, list[int]] = {}
+        for k, record in enumerate(self.records):
+            by_pose.setdefault(record.pose, []).append(k)
+        return [own[i % len(own)] for i, own in enumerate(by_pose.values())]
+
     def only(self, chosen: Sequence[int]) -> Data:
         """Some of the records.
 
@@ -266,7 +274,7 @@ class Percussion:
             first.append(known.get(name, default))
         shared = np.array(first + [known.get(o.name, 0.0) for o in self.inexact])
         zero = self.prior.mean
-        if at is None or like is None:
+        if at is None or like is None or like.data.chosen != self.data.chosen:
             return Numbers(shared, zero.groups, zero.records)
         own = []
         for k in range(len(self.data.records)):
@@ -403,10 +411,7 @@ class Percussion:
         Args:
             at: the numbers of all.
         """
-        by_pose: dict[int, list[int]] = {}
-        for k, pose in enumerate(self.group_of):
-            by_pose.setdefault(pose, []).append(k)
-        chosen = [own[i % len(own)] for i, own in enumerate(by_pose.values())]
+        chosen = self.data.one_a_pose
         data = self.data.only(chosen)
         return (
             replace(self, data=data, edges=()),

@@ -177,11 +177,11 @@ class Search:
         """
         causes = self.causes_of(fit)
         have = {cause.label for cause in causes}
-        end = WINDOWS[0]
-        scanned = self._scan(causes, [label for label in self.starts if label not in have], end)
+        few = self.data.only(self.data.one_a_pose)
+        scanned = self._scan(few, causes, [label for label in self.starts if label not in have])
         light = []
         for _, cause in scanned[:_LIGHT]:
-            likelihood = Percussion(self.data, (*causes, cause), end=end, light=True)
+            likelihood = _light(few, (*causes, cause))
             try:
                 found = estimate(likelihood, likelihood.start(), tolerance=2.0, renewals=3, steps=5)
             except FAILED:
@@ -197,10 +197,10 @@ class Search:
         return self._race(light[:_RACE])
 
     def _scan(
-        self, causes: tuple[Cause, ...], labels: Sequence[str], end: float | None
+        self, few: Data, causes: tuple[Cause, ...], labels: Sequence[str]
     ) -> list[tuple[float, Cause]]:
         """Each candidate at its best size, springs, damping and force moved with it by slopes."""
-        light = Percussion(self.data, causes, end=end, light=True)
+        light = _light(few, causes)
         at = light.start()
         slopes = light.linearised(at)
         found = []
@@ -216,7 +216,7 @@ class Search:
                 tried += [times(cause, s) if s != 1.0 else cause for s in sizes]
             values = []
             for cause in tried:
-                more = Percussion(self.data, (*causes, cause), end=end, light=True)
+                more = _light(few, (*causes, cause))
                 try:
                     residuals = more.residuals(more.start(at, light))
                 except FAILED:
@@ -305,3 +305,8 @@ class Search:
             if self.table.best is fit:
                 return
             fit = self.table.best
+
+
+def _light(few: Data, causes: Sequence[Cause]) -> Percussion:
+    """Begin of some records with springs, damping and force free, all else as stated."""
+    return Percussion(few, tuple(causes), end=WINDOWS[0], light=True)
