@@ -15,7 +15,7 @@ from picchio.campaign.tables import Tolerance
 from picchio.cli.main import run
 from picchio.core.errors import InputError
 from picchio.diagnosis.begin import Begun
-from picchio.diagnosis.stiffness.blows import Rough
+from picchio.diagnosis.percussion.search.far import Rough
 from picchio.reference.formats import formats
 
 ALL = {entry.name: entry for entry in formats().formats}

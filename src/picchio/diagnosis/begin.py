@@ -12,8 +12,7 @@ from picchio.campaign.campaign import Campaign
 from picchio.diagnosis.percussion.conclude.holdout import holdout_gain
 from picchio.diagnosis.percussion.data.problem import Problem, held_out
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
-from picchio.diagnosis.percussion.search.far import far_from_stated
-from picchio.diagnosis.stiffness.blows import Rough
+from picchio.diagnosis.percussion.search.far import Rough, far_from_stated
 from picchio.diagnosis.stiffness.mixed import with_stiffness
 from picchio.diagnosis.stiffness.prior import UNKNOWN
 from picchio.robot.flexible_robot import FlexibleRobot

@@ -133,7 +133,9 @@ class PercussionDiagnosis:
         Raises:
             InputError: as `picchio.diagnosis.life.life_before_and_after`.
         """
-        robot = self.problem.robot
+        # As the fit took gravity's stiffness, and as the saved model has it.
+        assumed = self.problem.model.gravity_stiffness
+        robot = replace(self.problem.robot, fitted_gravity=assumed)
         return life_before_and_after(
             robot,
             task,

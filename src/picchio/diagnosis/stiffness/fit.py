@@ -10,7 +10,7 @@ and the tails are those of the highest evidence (Laplace's approximation; MacKay
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -34,7 +34,6 @@ _NOISE_STD = math.log(10.0) / 1.645  # the instrument's stated noise is right wi
 _LEAST_NOISE = 1e-9  # m or rad, of files that are exact
 _PLAY = 1e-3  # rad or m: what play a joint may have, one standard deviation
 _STEPS, _ROUNDS = 60, 12
-_LOST = 3  # steps in turn that may be astray: a long one may lead back
 
 
 @dataclass(frozen=True, eq=False)
@@ -490,8 +489,6 @@ def climb(
     at: FloatArray,
     tail: float = math.inf,
     rows: BoolArray | None = None,
-    *,
-    astray: Callable[[FloatArray], bool] = lambda at: False,
 ) -> Fit:
     """The most probable numbers near a place, with the noise of the highest evidence.
 
@@ -500,10 +497,9 @@ def climb(
         at: (p,) where to begin.
         tail: degrees of freedom of the rows' errors; infinite: normal.
         rows: (rows,) which of them count; all if None.
-        astray: whether numbers are such that going on is in vain: it ends where they stay so.
 
     Returns:
-        the fit; where it went astray, as far as it came.
+        the fit.
     """
     keep = np.ones(problem.rows, bool) if rows is None else np.asarray(rows)
     stated = np.log([max(problem.noise[group], _LEAST_NOISE) for group in problem.groups])
@@ -525,9 +521,7 @@ def climb(
     last = math.inf
     for _ in range(_ROUNDS):
         state = _State(problem, state.at, tail, keep)
-        state = _newton(problem, state, tail, keep, noise, astray)
-        if astray(state.at):
-            break
+        state = _newton(problem, state, tail, keep, noise)
         for k in range(len(noise)):
 
             def off(x: float, k: int = k, state: _State = state) -> float:
@@ -562,15 +556,10 @@ def _newton(
     tail: float,
     keep: BoolArray,
     noise: FloatArray,
-    astray: Callable[[FloatArray], bool],
 ) -> _State:
     size = np.exp(noise)
     score = state.weigh(size)
-    lost = 0
     for _ in range(_STEPS):
-        lost = lost + 1 if astray(state.at) else 0
-        if lost > _LOST:
-            break
         step = -np.linalg.solve(state.step_matrix, state.gradient)
         gain = -float(step @ state.gradient)
         if gain < 1e-6:

@@ -132,23 +132,22 @@ def starts(problem: FrfProblem, seed: int = 0) -> list[FloatArray]:
     return kept[:_KEPT]
 
 
-def settled_elsewhere(problem: FrfProblem, fit: Fit, *, free: bool = True) -> Fit:
+def settled_elsewhere(problem: FrfProblem, fit: Fit) -> Fit:
     """The fit, or a better one far from it.
 
     Args:
         problem: what is fitted.
         fit: its best so far.
-        free: also look with masses and places free, which takes many times longer.
     """
     for _ in range(_LOOKS):
-        better = _elsewhere(problem, fit, free)
+        better = _elsewhere(problem, fit)
         if better is None:
             break
         fit = better
     return fit
 
 
-def _elsewhere(problem: FrfProblem, fit: Fit, free: bool) -> Fit | None:
+def _elsewhere(problem: FrfProblem, fit: Fit) -> Fit | None:
     """A better fit with one joint far from where it is; None where there is none.
 
     A joint that the functions hardly show may have ended at a false mode. Everything else held, its
@@ -176,7 +175,7 @@ def _elsewhere(problem: FrfProblem, fit: Fit, free: bool) -> Fit | None:
             if other.evidence > fit.evidence + _GAIN:
                 return other
     # Masses and places may have followed a false mode: with them free, what is told but not well.
-    weak = free & (fit.std[:n] > _WEAK) & (fit.std[:n] < 0.5 * problem.prior.std)
+    weak = (fit.std[:n] > _WEAK) & (fit.std[:n] < 0.5 * problem.prior.std)
     for k in np.flatnonzero(weak).tolist():
         for move in (-_MOVED, _MOVED):
             at = fit.mean.copy()

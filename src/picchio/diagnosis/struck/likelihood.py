@@ -41,6 +41,8 @@ class Data:
         shared: numbers of the campaign.
         groups: of a pose, as its first record has them.
         own: of each record, with the blow that each belongs to, or -1.
+        sought: effects whose values in the files count for nothing.
+        chosen: which of the records; all where None.
     """
 
     problem: Problem
@@ -50,11 +52,12 @@ class Data:
     own: tuple[tuple[tuple[Inexact, int], ...], ...]
 
     @classmethod
-    def of(cls, problem: Problem) -> Data:
+    def of(cls, problem: Problem, sought: frozenset[str] = frozenset()) -> Data:
         """From a problem.
 
         Args:
             problem: robot, records and noise.
+            sought: effects whose values in the files count for nothing: known within a factor.
         """
         old = Old.nominal(problem)
         tolerance = problem.campaign.tolerance
@@ -64,11 +67,10 @@ class Data:
             if sigma is None:
                 sigma = float(getattr(tolerance, effect.tolerance))
             cause = cause_of(effect, [], tolerance)
-            base.append(
-                replace(
-                    cause, numbers=tuple(replace(n, std=max(sigma, 1e-6)) for n in cause.numbers)
-                )
-            )
+            if effect.name not in sought:
+                numbers = tuple(replace(n, std=max(sigma, 1e-6)) for n in cause.numbers)
+                cause = replace(cause, numbers=numbers)
+            base.append(cause)
         lists = [inexact(problem, r, tolerance, measured=False) for r in problem.records]
         shared: dict[str, Inexact] = {}
         groups: dict[int, tuple[Inexact, ...]] = {}
@@ -95,8 +97,10 @@ class Data:
             tuple(shared.values()),
             tuple(groups[p] for p in sorted(groups)),
             tuple(own),
+            sought,
         )
 
+    sought: frozenset[str] = frozenset()
     chosen: tuple[int, ...] | None = None
 
     @cached_property

@@ -1,40 +1,66 @@
 """Stiffness that is far from what is stated, found from nothing before anything else is sought.
 
 Causes are added one by one, each from near the stated values. Where several joints are far off,
-none of them alone helps, and a fit of all ends a cycle beside the truth: they are found together,
-from the functions that the records are along a line in the Laplace plane (`stiffness.blows`).
+none of them alone helps, and a fit of all ends a cycle beside the truth. Nothing has turned by a
+cycle right after the first blow: all are found together there, and followed on growing windows.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.attempt import attempt
-from picchio.diagnosis.percussion.criteria.remainder import allowed
+from picchio.diagnosis.evidence.estimate import Fit as Estimate
+from picchio.diagnosis.evidence.estimate import estimate, standardised
+from picchio.diagnosis.evidence.verdict import LEFT, left_by
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem, signal_power
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit_growing
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.search.exchange import prune
 from picchio.diagnosis.percussion.search.state import Search
 from picchio.diagnosis.percussion.tolerance.linearise import About, settled
-from picchio.diagnosis.stiffness.blows import BlowRecord, Rough, rough
+from picchio.diagnosis.struck.likelihood import Data, Percussion
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.structure.springs.joint_stiffness import JointStiffness
 from picchio.model.effects.structure.springs.modal_damping import ModalDamping
 
+_WINDOWS = (0.02, 0.05, 0.1)
+"""s, up to when records are looked at, one after the other."""
+_COMMON = (0.0, -0.8, 0.8)
+"""Logarithms of a factor on all springs, with which to begin."""
+_STRAINED = 3.0
+"""Standard deviations, root mean square: where masses and places are farther off, it is they."""
 # What the stated values leave of the signal's power, at least, for this to be worth while.
 _MUCH = 0.02
-# What springs and damping alone leave of the functions, at most, and of what is left without.
-_LITTLE, _LESS = 0.35, 0.25
-_HALF = 0.5  # likewise, while masses and places are taken as stated
 # Logarithms: a joint that is off by this is found by itself, one that is off by more is not.
 _OFF, _FAR = math.log(1.2), math.log(1.6)
+_SOUGHT = frozenset({JointStiffness.name, ModalDamping.name})
 _SURE = 0.15  # standard deviation of the logarithm
+
+
+@dataclass(frozen=True)
+class Rough:
+    """Springs and damping as records of blows have them.
+
+    Attributes:
+        stiffness: (n,) over the stated.
+        stiffness_std: (n,) of the logarithms.
+        damping: of all ratios, over the stated.
+        left: residual over the signal, root mean square over the poses.
+        before: the same with the stated values.
+    """
+
+    stiffness: FloatArray
+    stiffness_std: FloatArray
+    damping: float
+    left: float
+    before: float
 
 
 def start_far(search: Search) -> None:
@@ -89,15 +115,62 @@ def far_from_stated(problem: Problem, records: Sequence[MeasuredRecord]) -> Roug
     """
     if problem.robot.effect_tables:  # whose springs and masses are not the files'
         return None
-    blown, tolerance = list(_blown(problem, records)), problem.campaign.tolerance
-    found = rough(problem.robot, blown, workers=problem.workers)
-    if found is None or not _is_far(found) or found.left > _HALF * found.before:
-        return None
-    if allowed(problem):
-        found = rough(problem.robot, blown, tolerance, found)
-    if found is None or found.left > min(_LITTLE, _LESS * found.before):
+    chosen = [k for k, record in enumerate(problem.records) if record in records]
+    data = Data.of(problem, _SOUGHT).only(chosen)
+    found = rough(data.only([chosen[k] for k in data.one_a_pose]))
+    if found is None or found.left > LEFT:
         return None
     return found if _is_far(found) else None
+
+
+def rough(data: Data) -> Rough | None:
+    """Springs and damping from nothing.
+
+    Args:
+        data: records, with springs and damping known within a factor.
+
+    Returns:
+        None where masses, poses and places would be absurdly far off.
+    """
+    tried = [attempt("springs from nothing", partial(_begun, data, size)) for size in _COMMON]
+    begun = min((one for one in tried if one), key=lambda one: one.objective.value, default=None)
+    if begun is None:
+        return None
+    stated = Percussion(data, end=_WINDOWS[-1])
+    at = stated.start(begun.at, begun.likelihood)
+    found = attempt("springs from nothing", partial(estimate, stated, at, tolerance=1.0))
+    if found is None:
+        return None
+    n = len(stated.effect_numbers)
+    off = standardised(stated.prior, found.at).shared[n:]
+    if off.size and off @ off > _STRAINED**2 * off.size:
+        return None
+    by_name = {c.label: k for k, (c, _) in enumerate(stated.effect_numbers)}
+    springs = [by_name[JointStiffness(name).label]
+               for name in data.problem.robot.flexible_names]  # fmt: skip
+    none = estimate(stated, stated.start(), steps=0)
+    return Rough(
+        np.exp(found.at.shared[springs]), found.std[springs],
+        math.exp(found.at.shared[by_name[ModalDamping("robot").label]]),
+        left_by(found), left_by(none),
+    )  # fmt: skip
+
+
+def _begun(data: Data, common: float) -> Estimate:
+    """Springs, damping and force on the first blow, all else as stated, then on longer windows."""
+    found: Estimate | None = None
+    for end in _WINDOWS:
+        likelihood = Percussion(data, end=end, light=True)
+        if found is None:
+            at = likelihood.start()
+            at.shared[[c.effect.name == JointStiffness.name
+                       for c, _ in likelihood.effect_numbers] + [False] * len(likelihood.inexact)
+                      ] += common  # fmt: skip
+        else:
+            at = likelihood.start(found.at, found.likelihood)
+        found = estimate(likelihood, at, tolerance=1.0, renewals=6)
+    assert found is not None
+    return found
 
 
 def _is_far(found: Rough) -> bool:
@@ -107,23 +180,6 @@ def _is_far(found: Rough) -> bool:
 
 def _away(found: Rough) -> FloatArray:
     return np.abs(np.log(found.stiffness)) * (found.stiffness_std < _SURE)
-
-
-def _blown(problem: Problem, records: Sequence[MeasuredRecord]) -> Iterator[BlowRecord]:
-    for record in records:
-        setup = record.setup
-        direction = problem.campaign[record.name].direction
-        if setup.steady or direction is None:
-            continue
-        rate = 1.0 / setup.samples.step
-        channels = [
-            (channel, record.values[channel.name], problem.noise[channel.name].at(rate).std)
-            for channel in record.channels
-        ]
-        force = setup.struck(problem.model).force
-        yield BlowRecord(
-            record.name, setup.geometry.pose, direction, setup.samples.times, force, channels
-        )
 
 
 def _fitted(search: Search, causes: list[Effect]) -> Fit:
