@@ -115,9 +115,10 @@ def far_from_stated(problem: Problem, records: Sequence[MeasuredRecord]) -> Roug
     """
     if problem.robot.effect_tables:  # whose springs and masses are not the files'
         return None
-    chosen = [k for k, record in enumerate(problem.records) if record in records]
-    data = Data.of(problem, _SOUGHT).only(chosen)
-    found = rough(data.only([chosen[k] for k in data.one_a_pose]))
+    names = {record.name for record in records}
+    chosen = [k for k, record in enumerate(problem.records) if record.name in names]
+    every = Data.of(problem, _SOUGHT)
+    found = rough(every.only([chosen[k] for k in every.only(chosen).one_a_pose]))
     if found is None or found.left > LEFT:
         return None
     return found if _is_far(found) else None
