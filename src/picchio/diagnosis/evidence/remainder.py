@@ -49,7 +49,7 @@ def left(square: float, samples: int, signal: float, records: int) -> Left:
         records: of the group.
     """
     freedom = FREEDOM * records
-    variance = 1.0 + _GRID**2 * signal / freedom
+    variance = 1.0 + _GRID**2 * signal / max(freedom, 1)
     log = -0.5 * (square - samples + freedom) / variance - 0.5 * freedom * np.log(variance)
     log = log + _LOG_PRIOR
     most = float(log.max())

@@ -39,7 +39,7 @@ class Judged:
 
 
 def left_by(fit: Fit) -> float:
-    """Relative size of what a fit leaves, root mean square over the groups.
+    """Relative size of what a fit leaves, root mean square over the groups that have records.
 
     Args:
         fit: of a set of causes.
@@ -47,7 +47,8 @@ def left_by(fit: Fit) -> float:
     Returns:
         1 is as much as was measured.
     """
-    return float(np.sqrt(np.mean(fit.objective.sizes**2)))
+    there = np.unique(fit.likelihood.group_of)
+    return float(np.sqrt(np.mean(fit.objective.sizes[there] ** 2)))
 
 
 def judge(table: Table) -> Judged:
