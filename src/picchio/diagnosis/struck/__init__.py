@@ -1,1 +1,1 @@
-"""Percussion records as a likelihood."""
+"""Search among sets of causes, by their evidence."""

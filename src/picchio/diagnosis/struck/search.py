@@ -29,9 +29,9 @@ from picchio.diagnosis.evidence.estimate import (
 from picchio.diagnosis.evidence.table import Table, labels_of
 from picchio.diagnosis.evidence.verdict import LEFT, Judged, judge
 from picchio.diagnosis.percussion.search.candidates import all_candidates
-from picchio.diagnosis.struck.causes import Cause, candidate_starts
+from picchio.diagnosis.percussion.struck.causes import Cause, candidate_starts
+from picchio.diagnosis.percussion.struck.likelihood import Data, Percussion
 from picchio.diagnosis.struck.drawn import drawn_candidates, missing_blows
-from picchio.diagnosis.struck.likelihood import Data, Percussion
 from picchio.diagnosis.struck.screening import screen, times
 from picchio.model.effects.scales import Scales
 

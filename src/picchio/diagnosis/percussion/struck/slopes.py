@@ -19,8 +19,8 @@ from picchio.core.arrays import BoolArray, ComplexArray, FloatArray, IndexArray
 from picchio.core.errors import InputError
 from picchio.diagnosis.evidence.numbers import Numbers
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord
+from picchio.diagnosis.percussion.struck.strike_kernel import answer, whiten_all
 from picchio.diagnosis.percussion.tolerance.nudges import POSE, Inexact, Nudge, as_effects
-from picchio.diagnosis.struck.strike_kernel import answer, whiten_all
 from picchio.measurement.noise.autoregression import AutoRegression
 from picchio.model.effects.effect import Effect
 from picchio.model.model import Model
@@ -37,7 +37,7 @@ from picchio.vibration.integration.integrate import AtJumps, Samples
 from picchio.vibration.integration.sensitivity import Strike, _Modes
 
 if TYPE_CHECKING:
-    from picchio.diagnosis.struck.likelihood import Percussion
+    from picchio.diagnosis.percussion.struck.likelihood import Percussion
 
 _STEP = 0.05  # of a standard deviation, by which a number is moved
 _TURN = 1e-4  # rad, by which a joint is

@@ -1,0 +1,1 @@
+"""The likelihood of percussion records, and its slopes."""
