@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import dataclasses
 import functools
 import math
@@ -31,6 +32,7 @@ from picchio.studies.tasks import Operation
 from picchio.vibration.batch.peaks import BatchPeaks
 
 _folder = tempfile.TemporaryDirectory(prefix="picchio-paper-")
+atexit.register(_folder.cleanup)
 
 
 @dataclass(frozen=True)
