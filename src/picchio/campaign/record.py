@@ -191,6 +191,9 @@ class Record(Shown):
         Args:
             robot: whose joints count.
 
+        Returns:
+            {joint: rad or m}, without the joints that have a channel.
+
         Raises:
             InputError: a pose that does not fit the robot.
         """

@@ -411,6 +411,9 @@ class FlexibleRobot(Shown):
 
         Args:
             unknown: the others.
+
+        Returns:
+            their names; empty where the others' places change nothing.
         """
         names, rng = self.joint_names, np.random.default_rng(0)
         apart = [name in unknown for name in names]

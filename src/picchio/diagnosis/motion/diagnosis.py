@@ -215,6 +215,9 @@ def not_recorded(*systems: System) -> dict[str, str]:
 
     Args:
         systems: all equations.
+
+    Returns:
+        {joint: sentence}; empty where every joint has an angle.
     """
     places: dict[str, dict[str, list[str]]] = {}
     needed = ", ".join(dict.fromkeys(joint for system in systems for joint in system.unposed))

@@ -429,6 +429,10 @@ def indistinguishable(score: Score, other: Score) -> bool:
     """Whether a rival is nearly as likely, or loses in no clear majority of the stretches.
 
     One that needs more numbers to do the same loses nowhere: it has to be as likely.
+
+    Args:
+        score: the best's.
+        other: the rival's.
     """
     if other.rank >= score.rank - _TIE:
         return True
