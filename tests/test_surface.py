@@ -216,6 +216,10 @@ def check_plot_show_and_frame(found: Shown) -> None:
             getattr(found, name)()
     if "plot" not in found.LACKS:
         for what in (None, *found.PLOTS):
+            if what == "scan" and not found.scans:  # no stiffness along which the life turns
+                with pytest.raises(picchio.InputError, match="no such scan"):
+                    found.plot(what)
+                continue
             assert isinstance(found.plot(what), Axes)
         plt.close("all")
         with pytest.raises(picchio.InputError, match=next(iter(found.PLOTS))):

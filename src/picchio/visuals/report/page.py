@@ -242,12 +242,18 @@ def report(
 
 
 def plain_page(
-    result: Result, *, command: str | None = None, warnings: Sequence[str] = (), **shown: Any
+    result: Result,
+    *,
+    command: str | None = None,
+    warnings: Sequence[str] = (),
+    pictures: Sequence[Any] = (),
+    sentences: Sequence[str] = (),
 ) -> str:
     """The page of a result that has none of its own: what a notebook shows, and its inputs."""
     return render(
         "plain.html.j2",
-        **shown,
+        pictures=pictures,
+        sentences=sentences,
         headline=result._headline(),
         body=Markup(result._repr_html_()),
         command=command,
