@@ -21,7 +21,13 @@ from picchio.campaign.channels import (
 )
 from picchio.campaign.clock import TOLERANCE, Clock, ClockCheck
 from picchio.campaign.source import Layout, MemorySource, Source
-from picchio.campaign.tables import FORMAT, CampaignExcitation, CampaignTable, RecordTable
+from picchio.campaign.tables import (
+    CAMPAIGN_FILE,
+    FORMAT,
+    CampaignExcitation,
+    CampaignTable,
+    RecordTable,
+)
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.core.shown import Shown
@@ -185,6 +191,23 @@ class Record(Shown):
         """Link-side joint positions (rad or m), as `FlexibleRobot.pose` takes them."""
         return self.table.pose
 
+    def posed(self, robot: FlexibleRobot) -> FloatArray:
+        """(nv,) the pose, rad or m; joints that it does not name are at 0.
+
+        Args:
+            robot: whose joints they are.
+
+        Raises:
+            InputError: as `FlexibleRobot.pose`, with the campaign's file and the record's number.
+        """
+        try:
+            return robot.pose({} if self.pose is None else self.pose)
+        except InputError as error:
+            path = self.source.path
+            if path is not None:
+                path = path.parents[len(Path(self.file).parts) - 1] / CAMPAIGN_FILE
+            raise error.placed(file=path, key=f"{self.source.key}.pose") from None
+
     def standing(self, robot: FlexibleRobot) -> dict[str, float | None]:
         """Joints whose angle was not recorded -> where `pose` says they stand, None if nowhere.
 
@@ -200,7 +223,7 @@ class Record(Shown):
         channels = [self.channel(name) for name in self.channels]
         seen = {c.subject for c in channels if c.kind.motion in ("link", "motor")}
         given = self.pose or {}
-        at = dict(zip(robot.joint_names, robot.pose(given).tolist(), strict=True))
+        at = dict(zip(robot.joint_names, self.posed(robot).tolist(), strict=True))
         stated = given if isinstance(given, dict) else robot.joint_names
         return {j: at[j] if j in stated else None for j in at if j not in seen}
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
-from pathlib import Path
 
 import numpy as np
 
@@ -13,7 +12,6 @@ from picchio.campaign.campaign import Campaign
 from picchio.campaign.channels import AXES, Channel
 from picchio.campaign.readers import Reading
 from picchio.campaign.record import Record
-from picchio.campaign.tables import CAMPAIGN_FILE
 from picchio.core.arrays import BoolArray, FloatArray
 from picchio.core.errors import InputError, warn_user
 from picchio.core.recent import Recent
@@ -520,13 +518,7 @@ def pose_of(robot: FlexibleRobot, record: Record) -> FloatArray:
     Raises:
         InputError: as `FlexibleRobot.pose`, with the campaign's file and the record's number.
     """
-    try:
-        return robot.pose({} if record.pose is None else record.pose)
-    except InputError as error:
-        path = record.source.path
-        if path is not None:
-            path = path.parents[len(Path(record.file).parts) - 1] / CAMPAIGN_FILE
-        raise error.placed(file=path, key=f"{record.source.key}.pose") from None
+    return record.posed(robot)
 
 
 def _warn_of_blows_beyond(record: Record) -> None:

@@ -52,17 +52,18 @@ _FEWEST_SECONDS = 0.15
 _SHOWN = 12
 
 
-def plot_candidates(found: Diagnosis, ax: Axes | None = None, *, step: int = 1) -> Axes:
+def plot_candidates(found: Diagnosis, ax: Axes | None = None, *, step: int | None = None) -> Axes:
     """What each candidate of a step of the search leaves, or takes of what is left.
 
     Args:
         found: the diagnosis.
         ax: where to draw.
-        step: of the search, from 1.
+        step: of the search, from 1; the first that compared candidates if not given.
 
     Raises:
         InputError: no such step.
     """
+    step = step or min((row["step"] for row in found.scores), default=1)
     rows = [row for row in found.scores if row["step"] == step]
     if not rows:
         raise InputError(
