@@ -8,5 +8,5 @@ import matplotlib.pyplot as plt
 import picchio
 
 life = picchio.assess("fanuc_like_3dof")
-life.plot().set_title(life.verdict.status)
+life.plot().set_title(life.verdict.status, loc="left")
 plt.show()

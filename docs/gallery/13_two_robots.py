@@ -9,5 +9,5 @@ import picchio
 
 figure, axes = plt.subplots(1, 2, figsize=(11, 4), layout="constrained")
 for name, ax in zip(("ur10", "panda"), axes, strict=True):
-    picchio.assess(name, uncertainty=False).plot(ax=ax).set_title(name)
+    picchio.assess(name, uncertainty=False).plot(ax=ax).set_title(name, loc="left")
 plt.show()
