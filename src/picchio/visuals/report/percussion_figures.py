@@ -73,7 +73,7 @@ def plot_candidates(found: Diagnosis, ax: Axes | None = None, *, step: int | Non
             choices=sorted({row["step"] for row in found.scores}),
         )
     stand = [(cause.effect, cause.target) for cause in found.causes]
-    if "bic" not in rows[0]:
+    if "screened_gain" not in rows[0]:
         return plot_motion_scores(rows[:_SHOWN], ax, chosen=stand)
     return plot_scores(rows[:_SHOWN], _without(found.details["percussion"]), ax, chosen=stand)
 
