@@ -327,7 +327,8 @@ def test_report_prints_with_page_numbers(open_page, pages, pictures) -> None:
         ".every(t => t.scrollWidth <= 688)"
     )
     first = ("#verdict", ".cover", ".warnings", ".material")
-    assert all(page.locator(e).first.bounding_box()["y"] < 1009 for e in first)
+    tops = {e: page.locator(e).first.bounding_box()["y"] for e in first}
+    assert all(y < 1009 for y in tops.values()), tops
     # Green is for safe alone.
     assert "safe" in page.locator("#verdict").get_attribute("class")
 

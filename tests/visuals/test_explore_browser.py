@@ -5,7 +5,10 @@ from __future__ import annotations
 import csv
 import io
 import xml.etree.ElementTree as ET
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 import numpy as np
@@ -132,19 +135,25 @@ def test_a_cell_whose_kernel_has_ended_shows_the_robot_and_why(
     live = picchio.explore("ur10", save=tmp_path / "kept.toml")
     cell = tmp_path / "cell.html"
     cell.write_text(f"<!DOCTYPE html><html><body>{live._repr_html_()}</body></html>")
+    # A notebook is a page of this machine: no other may frame it.
+    files = partial(SimpleHTTPRequestHandler, directory=tmp_path)
+    notebook = ThreadingHTTPServer(("127.0.0.1", 0), files)
+    Thread(target=notebook.serve_forever, daemon=True).start()
+    address = f"http://127.0.0.1:{notebook.server_port}/cell.html"
     width, height = viewport
     page = chromium.new_page(viewport={"width": width, "height": height})
-    page.goto(cell.as_uri())
+    page.goto(address)
     (inside,) = (frame for frame in page.frames if frame.url == live.url)
     inside.locator("html[data-ready]").wait_for(state="attached", timeout=120_000)
     assert inside.locator("h1").inner_text() == "ur10"
     live.close()
     page.close()
     page = chromium.new_page(viewport={"width": width, "height": height})
-    page.goto(cell.as_uri(), wait_until="domcontentloaded")
+    page.goto(address, wait_until="domcontentloaded")
     page.locator("object img").wait_for(state="visible")
     assert page.locator("object a").get_attribute("href") == live.url
     assert page.evaluate("document.querySelector('img').naturalWidth") > 300
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     photograph(page, path=pictures / f"explore-cell-ended-{width}.png")
     page.close()
+    notebook.shutdown()
