@@ -298,6 +298,7 @@ def show(found: Assessment, task: Task, terms: tuple[Term, ...] = ()) -> None:
     whose = "" if not task.assumed else ", of its example task" if task.files else ", assumed"
     for blows in every:
         out.print(f"  {blows}{whose}; {count_of(task.rivets_per_pass, 'rivet')} a pass")
+    out.print(styled("tool", f": {found.tool}"))
     for line in filter(None, (found.notice, task.note)):
         out.print(f"{line}.", style="yellow")
     out.print()
@@ -306,7 +307,6 @@ def show(found: Assessment, task: Task, terms: tuple[Term, ...] = ()) -> None:
         if line not in (found.notice, task.note):
             out.print(f"  - {line}")
     details()
-    out.print(styled("tool", f": {found.tool}"))
     reducers = [
         (j.name, j.reducer, j.reducer_governed_by or "-",
          *(map(spoken.number, (one.torque, one.limit)) if (one := j.reducer_governing) else "--"),
