@@ -105,8 +105,9 @@ def test_a_gain_is_told_as_it_went():
 
     assert told(0.31, 0.1) == (
         "the error falls from 31 % to 10 % of the signal (noise alone: 2 %): "
-        "89.9 % of what is wrong is explained"  # 89.97: never rounded up
+        "90.0 % of what is wrong is explained"
     )
+    assert told(1.0, 0.0202).endswith("99.9 % of what is wrong is explained")
     assert told(0.02, 0.02) == "the error stays at 2 % of the signal (noise alone: 2 %)"
     worse = told(0.20, 0.30)
     assert worse == "the error rises from 20 % to 30 % of the signal (noise alone: 2 %)"

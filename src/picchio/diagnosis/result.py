@@ -278,7 +278,8 @@ class Gain:
     @property
     def share(self) -> str:
         """How much is explained, in words: never rounded up to all of it."""
-        return f"{math.floor(1000.0 * (self.explained or 0.0)) / 10.0:.1f} %"
+        share = self.explained or 0.0
+        return f"{min(100.0 * share, 99.9 if share < 1.0 else 100.0):.1f} %"
 
     def to_dict(self) -> dict[str, Any]:
         """As in JSON."""

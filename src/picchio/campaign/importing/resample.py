@@ -319,8 +319,9 @@ def common_clock(
             cut[0], parts = _bridged(cut[0], parts, file)
         if asked.resample is None:
             if (jitter := _jitter(cut[0])) > TOLERANCE:
-                raise InputError(f"the clock is not even (by {jitter:.2g} steps)", file=file,
-                                 hint=_advice(whole))  # fmt: skip
+                found = f"the clock is not even (by {jitter:.2g} steps)"
+                told = "; ".join([found, *(one.told for one in raw.left)])
+                raise InputError(told, file=file, hint=_advice(whole))
             pieces.append((cut[0] - zero, [v.astype(np.float64) for v in parts]))
             continue
         assert rate is not None
