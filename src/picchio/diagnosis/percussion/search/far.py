@@ -22,9 +22,9 @@ from picchio.diagnosis.evidence.verdict import LEFT, left_by
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem, signal_power
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit_growing
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
+from picchio.diagnosis.percussion.likelihood.percussion import Data, Percussion
 from picchio.diagnosis.percussion.search.exchange import prune
 from picchio.diagnosis.percussion.search.state import Search
-from picchio.diagnosis.percussion.struck.likelihood import Data, Percussion
 from picchio.diagnosis.percussion.tolerance.linearise import About, settled
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.structure.springs.joint_stiffness import JointStiffness

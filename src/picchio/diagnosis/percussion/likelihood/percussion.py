@@ -20,13 +20,13 @@ from picchio.diagnosis.percussion.data.problem import (
     residual,
 )
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis as Old
-from picchio.diagnosis.percussion.struck.causes import Cause, EffectNumber, cause_of
+from picchio.diagnosis.percussion.likelihood.causes import Cause, EffectNumber, cause_of
 from picchio.diagnosis.percussion.tolerance.nudges import Inexact, inexact, nudged
 from picchio.model.effects.effect import Effect
 from picchio.model.model import Model
 
 if TYPE_CHECKING:
-    from picchio.diagnosis.percussion.struck.slopes import Slopes
+    from picchio.diagnosis.percussion.likelihood.slopes import Slopes
 
 _ONCE_A_POSE = ("pose_repeat", "damping_by_mode")
 
@@ -436,6 +436,6 @@ class Percussion:
         Args:
             at: the numbers.
         """
-        from picchio.diagnosis.percussion.struck.slopes import Slopes
+        from picchio.diagnosis.percussion.likelihood.slopes import Slopes
 
         return Slopes.of(self, at)

@@ -7,9 +7,9 @@ import picchio
 from picchio.diagnosis.evidence.numbers import Numbers
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
+from picchio.diagnosis.percussion.likelihood.percussion import Data, Percussion
+from picchio.diagnosis.percussion.posterior.search import Search
 from picchio.diagnosis.percussion.search.candidates import measure_scales
-from picchio.diagnosis.percussion.struck.likelihood import Data, Percussion
-from picchio.diagnosis.struck.search import Search
 from worlds import campaign as worlds
 
 ARM = "fanuc_like_3dof"

@@ -19,7 +19,7 @@ from picchio.core.arrays import BoolArray, ComplexArray, FloatArray, IndexArray
 from picchio.core.errors import InputError
 from picchio.diagnosis.evidence.numbers import Numbers
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord
-from picchio.diagnosis.percussion.struck.strike_kernel import answer, whiten_all
+from picchio.diagnosis.percussion.likelihood.strike_kernel import answer, whiten_all
 from picchio.diagnosis.percussion.tolerance.nudges import POSE, Inexact, Nudge, as_effects
 from picchio.measurement.noise.autoregression import AutoRegression
 from picchio.model.effects.effect import Effect
@@ -37,7 +37,7 @@ from picchio.vibration.integration.integrate import AtJumps, Samples
 from picchio.vibration.integration.sensitivity import Strike, _Modes
 
 if TYPE_CHECKING:
-    from picchio.diagnosis.percussion.struck.likelihood import Percussion
+    from picchio.diagnosis.percussion.likelihood.percussion import Percussion
 
 _STEP = 0.05  # of a standard deviation, by which a number is moved
 _TURN = 1e-4  # rad, by which a joint is

@@ -18,8 +18,8 @@ from picchio.diagnosis.evidence.estimate import (
     standardised,
 )
 from picchio.diagnosis.evidence.numbers import Numbers
-from picchio.diagnosis.percussion.struck.causes import Cause
-from picchio.diagnosis.percussion.struck.slopes import Candidate, Slopes
+from picchio.diagnosis.percussion.likelihood.causes import Cause
+from picchio.diagnosis.percussion.likelihood.slopes import Candidate, Slopes
 
 _PART = 0.02  # of the size at which an effect is tried: small enough for a slope
 _FARTHEST = 4.0  # times that size: farther no slope is believed

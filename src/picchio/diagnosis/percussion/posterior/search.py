@@ -28,11 +28,11 @@ from picchio.diagnosis.evidence.estimate import (
 )
 from picchio.diagnosis.evidence.table import Table, labels_of
 from picchio.diagnosis.evidence.verdict import LEFT, Judged, judge
+from picchio.diagnosis.percussion.likelihood.causes import Cause, candidate_starts
+from picchio.diagnosis.percussion.likelihood.percussion import Data, Percussion
+from picchio.diagnosis.percussion.posterior.drawn import drawn_candidates, missing_blows
+from picchio.diagnosis.percussion.posterior.screening import screen, times
 from picchio.diagnosis.percussion.search.candidates import all_candidates
-from picchio.diagnosis.percussion.struck.causes import Cause, candidate_starts
-from picchio.diagnosis.percussion.struck.likelihood import Data, Percussion
-from picchio.diagnosis.struck.drawn import drawn_candidates, missing_blows
-from picchio.diagnosis.struck.screening import screen, times
 from picchio.model.effects.scales import Scales
 
 WINDOWS = (0.1, 0.3, None)

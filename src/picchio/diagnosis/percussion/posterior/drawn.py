@@ -11,8 +11,8 @@ from picchio.core.arrays import FloatArray
 from picchio.diagnosis.evidence.arrow import reduce
 from picchio.diagnosis.evidence.estimate import Fit, scaled
 from picchio.diagnosis.evidence.numbers import Numbers
-from picchio.diagnosis.percussion.struck.causes import Cause, cause_of
-from picchio.diagnosis.percussion.struck.likelihood import Drawn, Percussion
+from picchio.diagnosis.percussion.likelihood.causes import Cause, cause_of
+from picchio.diagnosis.percussion.likelihood.percussion import Drawn, Percussion
 from picchio.diagnosis.percussion.tolerance.nudges import Inexact
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.scales import Scales
