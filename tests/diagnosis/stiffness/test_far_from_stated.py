@@ -77,6 +77,25 @@ def test_springs_from_nothing_are_near_enough_to_begin_with(worlds, sensors, fac
     assert found.left < 0.01 and found.before > 0.25
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("sensors", [("accelerometer",), ("accelerometer", "deflection")])
+def test_six_springs_from_nothing_in_a_world_that_is_a_little_wrong(worlds, sensors):
+    robot = load_robot("fanuc_r2000ic")
+    factors = np.exp(np.random.default_rng(5).uniform(np.log(0.4), np.log(2.5), 6))
+    causes = [
+        ("joint_stiffness", name, {"scale": factor})
+        for name, factor in zip(robot.flexible_names, factors, strict=True)
+    ]
+    campaign, truth = worlds.make(
+        robot=robot.name, seed=5, causes=causes, sensors=sensors, records=12, mismatch=1.0
+    )
+    own = [truth["nuisances"]["stiffness"][name] for name in robot.flexible_names]
+    problem = Problem(robot, campaign)
+    found = far_from_stated(problem, problem.records)
+    off = np.log(found.stiffness / (factors * own))
+    assert (np.abs(off) < 4.0 * found.stiffness_std).all() and np.median(np.abs(off)) < 0.02
+
+
 def test_a_robot_as_stated_is_left_alone(worlds):
     robot = load_robot("fanuc_like_3dof")
     for causes in ([], [("payload", "tool", {"mass": 5.0})]):

@@ -18,6 +18,8 @@ from picchio.diagnosis.evidence.arrow import Reduced, bounded, left_of, reduce
 from picchio.diagnosis.evidence.numbers import Numbers
 from picchio.diagnosis.evidence.remainder import left
 
+FAILED = (InputError, np.linalg.LinAlgError, FloatingPointError)
+"""What may happen where there is no model; anything else is a fault of the program."""
 RENEWED = 30.0
 """nats: slopes are taken anew after a step that gained more."""
 
@@ -309,7 +311,7 @@ def estimate(
                     if then.value < now.value - 1e-9:
                         moved, gained = (there, left_there, then), now.value - then.value
                         break
-                except (InputError, np.linalg.LinAlgError, FloatingPointError):
+                except FAILED:
                     pass
                 if not fresh and size < 0.3:
                     break

@@ -19,6 +19,7 @@ import numpy as np
 from picchio.core.errors import InputError
 from picchio.diagnosis.evidence.arrow import reduce
 from picchio.diagnosis.evidence.estimate import (
+    FAILED,
     Fit,
     estimate,
     objective,
@@ -37,8 +38,6 @@ from picchio.model.effects.scales import Scales
 
 WINDOWS = (0.1, 0.3, None)
 """s: numbers that are far off turn phases by cycles, and are sought on growing windows."""
-FAILED = (InputError, np.linalg.LinAlgError, FloatingPointError)
-"""What may happen where there is no model; anything else is a fault of the program."""
 # Effort, not verdicts: how many are looked at further.
 _NEAR, _LIGHT, _RACE = 5, 16, 6
 _SIZES = (0.5, 1.0, 2.0, 4.0)

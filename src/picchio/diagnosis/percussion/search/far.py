@@ -7,6 +7,7 @@ cycle right after the first blow: all are found together there, and followed on 
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,8 +17,8 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.attempt import attempt
+from picchio.diagnosis.evidence.estimate import FAILED, estimate, standardised
 from picchio.diagnosis.evidence.estimate import Fit as Estimate
-from picchio.diagnosis.evidence.estimate import estimate, standardised
 from picchio.diagnosis.evidence.verdict import LEFT, left_by
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem, signal_power
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit_growing
@@ -32,8 +33,6 @@ from picchio.model.effects.structure.springs.modal_damping import ModalDamping
 
 _WINDOWS = (0.02, 0.05, 0.1)
 """s, up to when records are looked at, one after the other."""
-_COMMON = (0.0, -0.8, 0.8)
-"""Logarithms of a factor on all springs, with which to begin."""
 _STRAINED = 3.0
 """Standard deviations, root mean square: where masses and places are farther off, it is they."""
 # What the stated values leave of the signal's power, at least, for this to be worth while.
@@ -42,6 +41,8 @@ _MUCH = 0.02
 _OFF, _FAR = math.log(1.2), math.log(1.6)
 _SOUGHT = frozenset({JointStiffness.name, ModalDamping.name})
 _SURE = 0.15  # standard deviation of the logarithm
+
+_log = logging.getLogger("picchio.diagnosis")
 
 
 @dataclass(frozen=True)
@@ -133,14 +134,19 @@ def rough(data: Data) -> Rough | None:
     Returns:
         None where masses, poses and places would be absurdly far off.
     """
-    tried = [attempt("springs from nothing", partial(_begun, data, size)) for size in _COMMON]
-    begun = min((one for one in tried if one), key=lambda one: one.objective.value, default=None)
-    if begun is None:
-        return None
-    stated = Percussion(data, end=_WINDOWS[-1])
-    at = stated.start(begun.at, begun.likelihood)
-    found = attempt("springs from nothing", partial(estimate, stated, at, tolerance=1.0))
-    if found is None:
+    found: Estimate | None = None
+    try:
+        for end in _WINDOWS:  # springs, damping and force, all else as stated
+            light = Percussion(data, end=end, light=True)
+            at = light.start(found.at, found.likelihood) if found else light.start()
+            found = estimate(light, at, tolerance=1.0, renewals=6)
+        assert found is not None
+        stated = Percussion(data, end=_WINDOWS[-1])
+        at = stated.start(found.at, found.likelihood)
+        found = estimate(stated, at, tolerance=1.0)
+        none = estimate(stated, stated.start(), steps=0)
+    except FAILED as error:
+        _log.debug("springs from nothing: %s", error)
         return None
     n = len(stated.effect_numbers)
     off = standardised(stated.prior, found.at).shared[n:]
@@ -149,29 +155,11 @@ def rough(data: Data) -> Rough | None:
     by_name = {c.label: k for k, (c, _) in enumerate(stated.effect_numbers)}
     springs = [by_name[JointStiffness(name).label]
                for name in data.problem.robot.flexible_names]  # fmt: skip
-    none = estimate(stated, stated.start(), steps=0)
     return Rough(
         np.exp(found.at.shared[springs]), found.std[springs],
         math.exp(found.at.shared[by_name[ModalDamping("robot").label]]),
         left_by(found), left_by(none),
     )  # fmt: skip
-
-
-def _begun(data: Data, common: float) -> Estimate:
-    """Springs, damping and force on the first blow, all else as stated, then on longer windows."""
-    found: Estimate | None = None
-    for end in _WINDOWS:
-        likelihood = Percussion(data, end=end, light=True)
-        if found is None:
-            at = likelihood.start()
-            at.shared[[c.effect.name == JointStiffness.name
-                       for c, _ in likelihood.effect_numbers] + [False] * len(likelihood.inexact)
-                      ] += common  # fmt: skip
-        else:
-            at = likelihood.start(found.at, found.likelihood)
-        found = estimate(likelihood, at, tolerance=1.0, renewals=6)
-    assert found is not None
-    return found
 
 
 def _is_far(found: Rough) -> bool:
