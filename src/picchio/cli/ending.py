@@ -182,6 +182,18 @@ def _may_be_left(frame: FrameType | None) -> bool:
     return True
 
 
+def shown(kind: type[BaseException], error: BaseException, trace: Any) -> None:
+    """Say nothing of a signal that compiled code met and dropped: it is raised again, and told.
+
+    Args:
+        kind: as `sys.excepthook` gets it, with the next two.
+        error: what was raised.
+        trace: where.
+    """
+    if not _dealt_with(error):
+        sys.__excepthook__(kind, error, trace)
+
+
 def drop(met: Any) -> None:
     """Say nothing of what Python can't raise, such as an error in a destructor, but for our own.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from typing import Any
 
-from picchio.cli.ending import STATUSES, Terminated, drop, end_at_once, ending
+from picchio.cli.ending import STATUSES, Terminated, drop, end_at_once, ending, shown
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -14,7 +14,7 @@ def main(arguments: list[str] | None = None) -> None:
     Args:
         arguments: as typed; those of the process, which is then ended, if None.
     """
-    sys.unraisablehook = drop
+    sys.unraisablehook, sys.excepthook = drop, shown
     try:
         with ending.obeyed(at_last=arguments is None):
             from picchio.cli.running import run, say_warnings

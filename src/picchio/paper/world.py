@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import contextlib
 import dataclasses
 import functools
 import math
@@ -19,6 +20,7 @@ from numpy.typing import ArrayLike
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.core.files import write_text
+from picchio.core.unfinished import unfinished
 from picchio.excitation.pulse_train import PulseTrain
 from picchio.fatigue.shaft_stress import stress_per_torque
 from picchio.model.model import Model
@@ -30,9 +32,6 @@ from picchio.studies.rivet.pose import ModelAtPose
 from picchio.studies.rivet.poses import peaks_at
 from picchio.studies.tasks import Operation
 from picchio.vibration.batch.peaks import BatchPeaks
-
-_folder = tempfile.TemporaryDirectory(prefix="picchio-paper-")
-atexit.register(_folder.cleanup)
 
 
 @dataclass(frozen=True)
@@ -131,9 +130,17 @@ def _bare_arm(values: PrintedArm, about: str) -> FlexibleRobot:
     from jinja2 import Template
 
     template = Template(paper_file("arm.urdf.j2").read_text("utf-8"))
-    path = Path(tempfile.mkdtemp(dir=_folder.name)) / f"paper_arm_{about}.urdf"
+    path = Path(tempfile.mkdtemp(dir=_folder())) / f"paper_arm_{about}.urdf"
     write_text(path, template.render(arm=values, about=about))
     return load_robot(path, tool="tool")
+
+
+@functools.cache
+def _folder() -> Path:
+    """Where arms stand, for they are read again: it goes with the process, however that ends."""
+    kept = contextlib.ExitStack()
+    atexit.register(kept.close)
+    return kept.enter_context(unfinished(lambda: Path(tempfile.mkdtemp(prefix="picchio-paper-"))))
 
 
 def poses_at(points: ArrayLike, elbow: str = "down") -> FloatArray:
