@@ -15,12 +15,18 @@ if HERE not in sys.path:
 COMMAND = [sys.executable, "-c", "from picchio.cli.main import main; main()"]
 
 
+@pytest.fixture(autouse=True)
+def hears_ctrl_c():
+    """What ignores Ctrl-C, such as a shell's background, leaves that to its children."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 @pytest.fixture
 def start(tmp_path):
     """`start(*arguments)`: a `picchio` process whose current folder is `tmp_path`."""
     started = []
-    # What ignores Ctrl-C, such as a shell's background, leaves that to its children.
-    signal.signal(signal.SIGINT, signal.default_int_handler)
 
     def begin(*arguments, **options):
         options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True} | options

@@ -94,15 +94,18 @@ def ended(given, typed, number, moment):
         [*words, *typed.split()], cwd=given, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
         text=True, env=os.environ | {"TMPDIR": str(temporary)},
     )  # fmt: skip
-    while not handled(process) and process.poll() is None:
-        time.sleep(0.001)
-    with contextlib.suppress(subprocess.TimeoutExpired):
-        process.wait(moment)
-    workers = children(process.pid) if process.poll() is None else set()
-    asked = time.monotonic()
-    process.send_signal(number)
-    _, said = process.communicate(timeout=60)
-    took = time.monotonic() - asked
+    try:
+        while not handled(process) and process.poll() is None:
+            time.sleep(0.001)
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(moment)
+        workers = children(process.pid) if process.poll() is None else set()
+        asked = time.monotonic()
+        process.send_signal(number)
+        _, said = process.communicate(timeout=60)
+        took = time.monotonic() - asked
+    finally:
+        process.kill()
     left = {p for p in given.rglob("*") if str(p) not in before and p != temporary}
     return process.returncode, said, took, left, [pid for pid in workers if alive(pid)]
 
@@ -115,7 +118,7 @@ def cases():
                 yield pytest.param(name, number, moment, marks=[] if quick else pytest.mark.slow)
 
 
-@pytest.mark.parametrize(("name", "number", "moment"), cases())
+@pytest.mark.parametrize(("name", "number", "moment"), list(cases()))
 def test_asked_to_end(given, name, number, moment):
     status, said, took, left, workers = ended(given, COMMANDS[name], number, moment)
     kept = {p for p in left if RESUMED & set(p.parts) or p.name.split("-")[0] in BOOKS}

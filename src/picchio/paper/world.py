@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import atexit
-import contextlib
 import dataclasses
 import functools
 import math
@@ -113,7 +111,7 @@ def arm(given: Assumptions, values: PrintedArm | None = None) -> FlexibleRobot:
     """The arm of section 4.1 with assumed damping and shafts.
 
     Each shaft is the one that is the whole of its joint's spring (k = G Jp / l) and has the
-    assumed stress per twist G r / l: r = (2 k / (pi G r / l))^(1/3).
+    assumed stress per twist G r / l: r = (2 k / (pi G r / l))^(1/3). No file of it is kept.
     """
     robot, joints = _bare_arm(values or printed().arm, given.inertia_about), []
     for joint in robot.flexible_joints:
@@ -130,17 +128,10 @@ def _bare_arm(values: PrintedArm, about: str) -> FlexibleRobot:
     from jinja2 import Template
 
     template = Template(paper_file("arm.urdf.j2").read_text("utf-8"))
-    path = Path(tempfile.mkdtemp(dir=_folder())) / f"paper_arm_{about}.urdf"
-    write_text(path, template.render(arm=values, about=about))
-    return load_robot(path, tool="tool")
-
-
-@functools.cache
-def _folder() -> Path:
-    """Where arms stand, for they are read again: it goes with the process, however that ends."""
-    kept = contextlib.ExitStack()
-    atexit.register(kept.close)
-    return kept.enter_context(unfinished(lambda: Path(tempfile.mkdtemp(prefix="picchio-paper-"))))
+    with unfinished(lambda: Path(tempfile.mkdtemp(prefix="picchio-paper-"))) as folder:
+        path = folder / f"paper_arm_{about}.urdf"
+        write_text(path, template.render(arm=values, about=about))
+        return dataclasses.replace(load_robot(path, tool="tool"), files=())
 
 
 def poses_at(points: ArrayLike, elbow: str = "down") -> FloatArray:
