@@ -39,9 +39,20 @@ def draw(example: Path, picture: Path) -> None:
                 photograph(pages[0], picture)
             else:
                 raise SystemExit(f"{example.name} draws nothing")
+            if empty(picture):
+                raise SystemExit(f"{example.name} draws an empty picture")
         finally:
             os.chdir(before)
             plt.close("all")
+
+
+def empty(picture: Path) -> bool:
+    """Whether a picture is tiny, or one grey all over."""
+    import numpy as np
+    from PIL import Image
+
+    pixels = np.asarray(Image.open(picture).convert("L"), float)
+    return min(pixels.shape) < 300 or pixels.std() < 5.0
 
 
 def photograph(page: Path, picture: Path, width: int = 1000, height: int = 640) -> None:

@@ -89,11 +89,14 @@ def test_without_delay_in_the_catalogue_no_wrong_name(robot, kuka):
         ("viscous_friction", {("load_friction", "joint_a3")}),
         ("joint_inertia", {("torque_gain", "joint_a1")}),
         ("joint_stiffness", set()),
-        ("torque_offset", set()),
+        ("torque_offset", {("asymmetric_friction", "joint_a3")}),
     ],
 )
 def test_without_a_cause_the_verdict_stays_partial(robot, kuka, diagnosis, gone, instead):
-    """What comes in its place is told: an axis without weight can't tell inertia from gain."""
+    """What comes in its place is told: an axis without weight can't tell inertia from gain.
+
+    Friction that differs with the direction is an offset for as long as a joint moves.
+    """
     other = diagnose_motion(robot, kuka, without=[gone])
     labels = [{(c.effect, c.target) for c in d.causes} for d in (diagnosis, other)]
     assert other.verdict == "partial"

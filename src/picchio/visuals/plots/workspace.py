@@ -124,16 +124,16 @@ def plot_workspace_map(
     margin = 0.8 * step
     ax.set_xlim(places[:, across].min() - margin, places[:, across].max() + margin)
     ax.set_ylim(places[:, up].min() - margin, places[:, up].max() + margin)
+    estimated = "; estimated" if found.attrs.get("estimated") else ""
     ax.set(xlabel=f"{'xyz'[across]} [m]", ylabel=f"{'xyz'[up]} [m]",
-           title=f"Peak deflection of {plain(joint)}, by place; "
-           f"{response_of(dataset_of(workspace))}")  # fmt: skip
+           title=f"{plain(joint)}: peak deflection by place\n"
+           f"{response_of(found)}{estimated}")  # fmt: skip
     # Squares that touch: the marker's size is in points, the map's spacing in metres.
     wide = ax.get_window_extent().width / (ax.get_xlim()[1] - ax.get_xlim()[0])
     size = 72.0 / ax.figure.dpi * wide * step * 0.8
     shown = ax.scatter(places[order, across], places[order, up], c=peak[order] * 1e3, s=size**2,
                        marker="s", cmap=CMAP, vmin=0.0, linewidths=0)  # fmt: skip
-    if found.attrs.get("estimated"):
-        ax.set_title(f"{ax.get_title(loc='left')}\nestimated: at the most likely values")
+    if estimated:
         ax.add_patch(Rectangle((0, 0), 1, 1, transform=ax.transAxes, fill=False, hatch=HATCH,
                                edgecolor=PAPER, linewidth=0.0, alpha=0.35))  # fmt: skip
     bar = ax.figure.colorbar(shown, ax=ax, pad=0.02)

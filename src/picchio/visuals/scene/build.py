@@ -82,7 +82,7 @@ def build_scene(
     tree = frames(robot, checked)
     places = world(tree)
     body = build_body(robot, checked, tree, places)
-    where = ", ".join(f"{q:.3g}" for q in checked)
+    where = ", ".join(f"{q:.3g}" for q in np.round(checked, 4) + 0.0)
     how = described(hits)
     scene = Scene(robot.name, f"pose ({where}); {excitation.describe()}; {how}", envelope, tree)
     scene.chosen, scene.reach = _first(envelope, assessment, joint), body.reach
