@@ -29,7 +29,7 @@ _skipped: list[str] = []
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with what takes minutes."""
+    """Begin with what takes minutes, lest one core waits for it at the end."""
     items.sort(key=lambda item: item.get_closest_marker("minutes") is None)
 
 

@@ -52,7 +52,7 @@ def follow(page: Path) -> None:
         pytest.param(
             "tutorial/diagnose",
             ("why.html", "flex.toml"),
-            marks=(pytest.mark.slow, pytest.mark.minutes, pytest.mark.timeout(1500)),
+            marks=(pytest.mark.slow, pytest.mark.timeout(1500)),
         ),
         ("how_to/count", ("life.html", "cell.ledger")),
         ("how_to/python", ()),
