@@ -220,6 +220,7 @@ def test_a_search_finds_both_causes_though_the_first_hides_the_second(two_causes
 
 
 @pytest.mark.slow
+@pytest.mark.minutes
 def test_a_search_that_starts_with_the_wrong_cause_ends_with_the_right_ones(two_causes):
     """What other records tell may be wrong here: it is taken out again."""
     problem, baseline, wrong, *_ = two_causes
@@ -299,6 +300,7 @@ def test_of_what_does_as_well_the_records_held_out_choose(gains, chosen):
 
 
 @pytest.mark.slow
+@pytest.mark.minutes
 def test_warmth_is_not_chosen_where_a_record_held_out_says_it_was_the_day(arm):
     """In the records that are fitted both explain as much, to one in chi-square."""
     campaign, truth = trial.make(
@@ -312,6 +314,7 @@ def test_warmth_is_not_chosen_where_a_record_held_out_says_it_was_the_day(arm):
 
 
 @pytest.mark.slow
+@pytest.mark.minutes
 @pytest.mark.parametrize(
     "draw",
     [
@@ -334,6 +337,7 @@ def test_a_tilting_bearing_is_found_though_others_promise_more(draw, arm):
 
 
 @pytest.mark.slow
+@pytest.mark.minutes
 def test_a_contact_that_a_fit_holds_shut_for_ever_is_opened_again(arm):
     """With a preload far beyond the force it is a spring: no slope leads back to less."""
     contact = ("workpiece_contact", "tool", {"stiffness": 1e5, "damping": 290.0, "preload": 34.0})
@@ -380,6 +384,7 @@ def test_what_was_fitted_to_a_part_of_the_records_is_no_alternative(two_causes):
 
 
 @pytest.mark.slow
+@pytest.mark.minutes
 @pytest.mark.parametrize("records", [6, 18], ids=["replaced", "followed"])
 def test_a_half_sine_is_not_told_as_a_width_that_suits_stated_numbers_better(records, arm):
     """About numbers as they are stated the wrong one explains more: the blows rise slowly."""
@@ -463,6 +468,7 @@ def test_a_simpler_rival_is_compared_even_where_noise_is_left(arm):
 
 
 @pytest.mark.slow
+@pytest.mark.minutes
 @pytest.mark.parametrize("chosen", ["link_2", "link_3"])
 def test_what_stands_out_little_beside_a_cause_may_be_that_cause(chosen, arm):
     """Tolerances made up for a lighter link, and their slopes chose another one."""
