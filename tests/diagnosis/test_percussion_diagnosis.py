@@ -34,7 +34,7 @@ SINGLES = [
     "pulse_rate", "pulse_jitter", "rebound", "stiffness_drift", "sensor_gain", "sensor_delay",
     "mount_resonance",
 ]  # fmt: skip
-OF_EACH_KIND = ["payload", "backlash", "workpiece_contact", "pulse_rate", "sensor_gain"]
+OF_EACH_KIND = ["payload", "backlash", "sensor_gain"]
 OUTSIDE = ["coupled_joints", "loose_bolt"]
 RARELY = pytest.mark.minutes
 
@@ -175,7 +175,7 @@ def test_three_effects_are_named_though_the_first_stood_for_two():
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-@pytest.mark.parametrize("draw", [0, 1, *(pytest.param(n, marks=RARELY) for n in (2, 3))])
+@pytest.mark.parametrize("draw", [0, *(pytest.param(n, marks=RARELY) for n in (1, 2, 3))])
 def test_no_alarm_where_nothing_is_wrong(draw):
     row = trial.run(_case("null", draw=draw))
     assert row["verdict"] == "nothing-wrong", row
@@ -212,7 +212,8 @@ def test_with_the_true_cause_taken_out_no_other_is_named(effect):
 @pytest.mark.parametrize(
     ("effect", "draw"),
     [
-        ("cable", 1),  # noise in the poses that are looked at first
+        # Noise in the poses that are looked at first.
+        pytest.param("cable", 1, marks=RARELY),
         # A tenth as stiff as the contacts that are screened.
         pytest.param("workpiece_contact", 1, marks=RARELY),
         # A fit that stopped short, and late blows that moved it on.
