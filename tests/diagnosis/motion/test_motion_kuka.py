@@ -9,6 +9,9 @@ from picchio.diagnosis.motion.diagnosis import diagnose_motion
 from picchio.robot.loading.load import load_robot
 
 pytestmark = pytest.mark.slow
+STANDS_IN = pytest.mark.xfail(
+    strict=True, reason="friction of joint_a3 that differs by direction is named for an offset"
+)
 AXES = ("joint_a1", "joint_a2", "joint_a3")
 
 
@@ -91,14 +94,11 @@ def test_without_delay_in_the_catalogue_no_wrong_name(robot, kuka):
         ),
         ("joint_inertia", {("torque_gain", "joint_a1")}),
         pytest.param("joint_stiffness", set(), marks=pytest.mark.minutes),
-        ("torque_offset", {("asymmetric_friction", "joint_a3")}),
+        pytest.param("torque_offset", set(), marks=STANDS_IN),
     ],
 )
 def test_without_a_cause_the_verdict_stays_partial(robot, kuka, diagnosis, gone, instead):
-    """What comes in its place is told: an axis without weight can't tell inertia from gain.
-
-    Friction that differs with the direction is an offset for as long as a joint moves.
-    """
+    """What comes in its place is told: an axis without weight can't tell inertia from gain."""
     other = diagnose_motion(robot, kuka, without=[gone])
     labels = [{(c.effect, c.target) for c in d.causes} for d in (diagnosis, other)]
     assert other.verdict == "partial"
