@@ -9,7 +9,7 @@ from contextlib import suppress
 import pytest
 from held import alive, children
 
-from picchio.cli.ending import Ending
+from picchio.cli.ending import Ending, Terminated, shown
 from picchio.prediction.plan import Plan
 from picchio.prediction.simulation import simulate
 
@@ -127,6 +127,15 @@ def test_what_drops_an_interrupt_does_not_lose_it():
     with Ending().obeyed():
         pass
     assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_a_signal_that_was_dropped_leaves_no_trace(capsys):
+    """Cython shows what it drops by sys.excepthook; an error is shown as ever."""
+    for error in (KeyboardInterrupt(), Terminated()):
+        shown(type(error), error, None)
+        assert capsys.readouterr().err == ""
+    shown(ValueError, ValueError("wrong"), None)
+    assert "ValueError: wrong" in capsys.readouterr().err
 
 
 def test_what_tidies_up_is_not_interrupted_again():

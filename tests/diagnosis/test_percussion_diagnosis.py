@@ -34,9 +34,7 @@ SINGLES = [
     "pulse_rate", "pulse_jitter", "rebound", "stiffness_drift", "sensor_gain", "sensor_delay",
     "mount_resonance",
 ]  # fmt: skip
-OF_EACH_KIND = ["payload", "backlash", "sensor_gain"]
 OUTSIDE = ["coupled_joints", "loose_bolt"]
-RARELY = pytest.mark.minutes
 
 
 def _case(kind, effect=None, draw=0):
@@ -146,9 +144,7 @@ def test_bad_input_is_one_line_before_anything_is_done(tmp_path, capsys, monkeyp
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-@pytest.mark.parametrize(
-    "effect", [e if e in OF_EACH_KIND else pytest.param(e, marks=RARELY) for e in SINGLES]
-)
+@pytest.mark.parametrize("effect", SINGLES)
 def test_one_hidden_effect_is_named_alone(effect):
     row = trial.run(_case("single", effect))
     assert row["verdict"] == "named", row
@@ -175,7 +171,7 @@ def test_three_effects_are_named_though_the_first_stood_for_two():
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-@pytest.mark.parametrize("draw", [0, *(pytest.param(n, marks=RARELY) for n in (1, 2, 3))])
+@pytest.mark.parametrize("draw", range(4))
 def test_no_alarm_where_nothing_is_wrong(draw):
     row = trial.run(_case("null", draw=draw))
     assert row["verdict"] == "nothing-wrong", row
@@ -212,14 +208,10 @@ def test_with_the_true_cause_taken_out_no_other_is_named(effect):
 @pytest.mark.parametrize(
     ("effect", "draw"),
     [
-        # Noise in the poses that are looked at first.
-        pytest.param("cable", 1, marks=RARELY),
-        # A tenth as stiff as the contacts that are screened.
-        pytest.param("workpiece_contact", 1, marks=RARELY),
-        # A fit that stopped short, and late blows that moved it on.
-        pytest.param("base_compliance", 1, marks=RARELY),
-        # Blows hardly late, each by itself not worth a number.
-        pytest.param("pulse_jitter", 1, marks=RARELY),
+        ("cable", 1),  # noise in the poses that are looked at first
+        ("workpiece_contact", 1),  # a tenth as stiff as the contacts that are screened
+        ("base_compliance", 1),  # a fit that stopped short, and late blows that moved it on
+        ("pulse_jitter", 1),  # blows hardly late, each by itself not worth a number
         ("mains_hum", 0),
     ],
 )

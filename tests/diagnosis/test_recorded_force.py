@@ -131,7 +131,7 @@ def test_a_cause_that_helps_little_held_out_is_dropped_where_little_was_left(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("draw", [91201, pytest.param(91206, marks=pytest.mark.minutes)])
+@pytest.mark.parametrize("draw", [91201, 91206])
 def test_nothing_wrong_is_nothing_wrong(arm, draw):
     """In draw 91206 the slopes of all records say nothing of values that fewer have told."""
     campaign, _ = trial.make({**CASE, "kind": "null", "draw": draw}, 1)
@@ -153,10 +153,7 @@ def test_what_is_wrong_is_named(arm):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("seed", "late", "within"),
-    [pytest.param(91300, 2e-3, 2e-6, marks=pytest.mark.minutes), (91301, 6e-4, 5e-6)],
-)
+@pytest.mark.parametrize(("seed", "late", "within"), [(91300, 2e-3, 2e-6), (91301, 6e-4, 5e-6)])
 def test_a_force_sensor_that_is_late_is_told_as_that(arm, worlds, seed, late, within):
     """And not as all other sensors being early; to a hundredth of a sample, whole ones or not."""
     campaign, _ = worlds.make(seed=seed, mismatch=1.0, snr_db=40.0, sensors=CASE["sensors"],

@@ -85,7 +85,6 @@ def value(diagnosis, effect, name):
     return next(c for c in diagnosis.causes if c.effect == effect).parameters[name].value
 
 
-@pytest.mark.minutes
 def test_without_payload_in_the_catalogue_no_wrong_name(robot, kinova, diagnosis):
     """What hangs at the flange and a heavier last link make the same torques: one class."""
     other = diagnose_motion(robot, kinova, without=["payload", "payload_body", "link_inertia"])
@@ -94,7 +93,6 @@ def test_without_payload_in_the_catalogue_no_wrong_name(robot, kinova, diagnosis
     assert labels(other) < labels(diagnosis)
 
 
-@pytest.mark.minutes
 def test_the_smallest_payload_that_is_found(robot, kinova, diagnosis, repository):
     urdf = str(repository / "robots" / "kinova_gen3" / "robot.urdf")
     found = diagnose_motion(robot, injection.inject(kinova, injection.payload(urdf, "tool0", 0.25)))
@@ -102,7 +100,6 @@ def test_the_smallest_payload_that_is_found(robot, kinova, diagnosis, repository
     assert more == pytest.approx(0.25, abs=0.03)
 
 
-@pytest.mark.minutes
 def test_the_smallest_delay_that_is_found(robot, kinova, diagnosis):
     found = diagnose_motion(robot, injection.inject(kinova, injection.delay("torque", 0.001)))
     more = value(found, "encoder_delay", "delay") - value(diagnosis, "encoder_delay", "delay")

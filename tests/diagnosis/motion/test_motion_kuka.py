@@ -89,11 +89,9 @@ def test_without_delay_in_the_catalogue_no_wrong_name(robot, kuka):
 @pytest.mark.parametrize(
     ("gone", "instead"),
     [
-        pytest.param(
-            "viscous_friction", {("load_friction", "joint_a3")}, marks=pytest.mark.minutes
-        ),
+        ("viscous_friction", {("load_friction", "joint_a3")}),
         ("joint_inertia", {("torque_gain", "joint_a1")}),
-        pytest.param("joint_stiffness", set(), marks=pytest.mark.minutes),
+        ("joint_stiffness", set()),
         pytest.param("torque_offset", set(), marks=STANDS_IN),
     ],
 )
@@ -106,9 +104,7 @@ def test_without_a_cause_the_verdict_stays_partial(robot, kuka, diagnosis, gone,
     assert labels[1] - labels[0] == instead
 
 
-@pytest.mark.parametrize(
-    "more", [0.001, *(pytest.param(s, marks=pytest.mark.minutes) for s in (0.0001, 0.004))]
-)
+@pytest.mark.parametrize("more", [0.0001, 0.001, 0.004])
 def test_an_injected_delay_adds_to_the_one_there(robot, kuka, diagnosis, more):
     changed = injection.inject(kuka, injection.delay("position", more))
     found = diagnose_motion(robot, changed).causes[0]

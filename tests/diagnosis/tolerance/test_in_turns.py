@@ -42,7 +42,6 @@ def power(fit):
 
 
 @pytest.mark.slow
-@pytest.mark.minutes
 def test_blows_times_and_tolerances_are_found_together(late):
     """Springs pass for wrong by five deviations where times are left a little off."""
     problem, truth, found = late

@@ -124,7 +124,7 @@ def plot_workspace_map(
     margin = 0.8 * step
     ax.set_xlim(places[:, across].min() - margin, places[:, across].max() + margin)
     ax.set_ylim(places[:, up].min() - margin, places[:, up].max() + margin)
-    estimated = "; estimated" if found.attrs.get("estimated") else ""
+    estimated = "; estimated, at the most likely values" if found.attrs.get("estimated") else ""
     ax.set(xlabel=f"{'xyz'[across]} [m]", ylabel=f"{'xyz'[up]} [m]",
            title=f"{plain(joint)}: peak deflection by place\n"
            f"{response_of(found)}{estimated}")  # fmt: skip
