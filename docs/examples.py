@@ -34,7 +34,7 @@ def draw(example: Path, picture: Path) -> None:
             runpy.run_path(str(example))
             pages = list(Path(folder).glob("*.html"))
             if plt.get_fignums():
-                plt.gcf().savefig(picture, dpi=100, bbox_inches="tight")
+                plt.gcf().savefig(picture, dpi=150, bbox_inches="tight")
             elif pages:
                 photograph(pages[0], picture)
             else:
