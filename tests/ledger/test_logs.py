@@ -11,6 +11,7 @@ import picchio
 from picchio.core.errors import InputError, OutputError
 from picchio.ledger import fleet as fleets
 from picchio.ledger.count import count
+from picchio.ledger.store import Ledger
 
 NAME, BEGIN = "fanuc_like_3dof", 1_772_352_000
 POSE = {"q1": 0.3, "q2": 1.1, "q3": -1.0}
@@ -136,6 +137,24 @@ def test_a_fleet_that_could_not_be_written_fails(tmp_path, in_process, monkeypat
     monkeypatch.setattr(fleets, "count", _fails(InputError("is empty", file="y")))
     done = in_process(*call, cwd=tmp_path)
     assert done.returncode == 2 and "no robot could be counted: y: is empty" in done.stderr
+
+
+def test_a_worker_that_is_killed_leaves_no_empty_ledger(tmp_path, robot, monkeypatch):
+    for name in "ab":
+        write(_made(tmp_path / "cells", name), SECOND)
+    (tmp_path / "books").mkdir()
+    real = fleets.count
+
+    def dies_at_the_second(loaded, log, ledger, **options):
+        if log.name == "b":
+            Ledger(ledger, NAME).__enter__()
+            raise KeyboardInterrupt
+        return real(loaded, log, ledger, **options)
+
+    monkeypatch.setattr(fleets, "count", dies_at_the_second)
+    with pytest.raises(KeyboardInterrupt):
+        fleets.count_fleet(robot, tmp_path / "cells", tmp_path / "books")
+    assert [p.name for p in (tmp_path / "books").iterdir()] == [f"a{fleets.ENDING}"]
 
 
 def _made(folder, name):

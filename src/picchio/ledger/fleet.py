@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -16,9 +18,11 @@ from picchio.core.html import sheet
 from picchio.core.provenance import provenance
 from picchio.core.results import TableResult
 from picchio.core.spread import require_scheduler, spread
+from picchio.core.unfinished import unfinished
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.ledger.count import MAPPING, count
 from picchio.ledger.result import Count
+from picchio.ledger.store import drop_empty
 from picchio.ledger.watch.exchange import Exchange, whose
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.default_task import task_of
@@ -162,10 +166,16 @@ def count_fleet(
         shared = folder / MAPPING
     job = _Job(robot, work, shared, books, sn_curve, seed, hours_per_day)
     found = []
-    for row in _spread(job, [folder / name for name in names], workers, scheduler):
-        found.append(row)
-        if progress is not None:
-            progress(len(found), len(names))
+    with ExitStack() as ended:
+        # A worker that is killed leaves its ledger as it is: an empty one does not stay.
+        for book in (_book(books, name) for name in names):
+            if not book.exists():
+                ended.enter_context(unfinished(partial(Path, book), drop_empty))
+        rows = _spread(job, [folder / name for name in names], workers, scheduler)
+        for row in ended.enter_context(closing(rows)):
+            found.append(row)
+            if progress is not None:
+                progress(len(found), len(names))
     _told_apart(found)
     failed = [error for row in found if (error := row.pop("_failed")) is not None]
     found.sort(key=lambda row: (-(row["damage"] or 0.0), row["name"]))
@@ -175,7 +185,7 @@ def count_fleet(
 
 def _spread(
     job: _Job, folders: Sequence[Path], workers: int | None, scheduler: str | None
-) -> Iterator[dict[str, Any]]:
+) -> Generator[dict[str, Any], None, None]:
     """A row for each folder, in any order."""
     if scheduler is None and workers == 1:
         yield from (_row(job, folder) for folder in folders)
@@ -183,6 +193,11 @@ def _spread(
     if scheduler is not None:
         require_scheduler(scheduler)
     yield from spread(_row, job, folders, workers=workers, scheduler=scheduler)
+
+
+def _book(folder: Path, name: str) -> Path:
+    """A robot's ledger."""
+    return folder / f"{name}{ENDING}"
 
 
 def _row(job: _Job, folder: Path) -> dict[str, Any]:
@@ -196,7 +211,7 @@ def _row(job: _Job, folder: Path) -> dict[str, Any]:
     row |= {"name": printable_name(folder), "changes": [], "refused": [], "another_robot": None,
             "_exchange": None, "_signature": {}, "_failed": None}  # fmt: skip
     try:
-        found = count(job.robot, folder, job.ledgers / f"{folder.name}{ENDING}", mapping=mapping,
+        found = count(job.robot, folder, _book(job.ledgers, folder.name), mapping=mapping,
                       task=job.task, sn_curve=job.sn_curve, seed=job.seed,
                       hours_per_day=job.hours_per_day)  # fmt: skip
     except PicchioError as error:

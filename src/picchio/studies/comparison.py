@@ -194,7 +194,7 @@ class Comparison(TableResult):
 
     def _headline(self) -> str:
         names = ", ".join(item.name for item in self.items)
-        return f"{names}: {len(self.inputs)} inputs and {len(self.results)} results differ"
+        return self.bottom_line or f"{names}: {len(self.figures)} results differ"
 
     def _repr_html_(self) -> str:
         rows = [[row.label, *row.shown] for row in (*self.entered, *self.figures)]
