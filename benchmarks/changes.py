@@ -1,6 +1,6 @@
 """How often a change is told, dated and sized, and how often one is told where there is none.
 
-    python benchmarks/changes.py [--histories 100] [--logs 3] [--swaps 3]
+    python benchmarks/changes.py [--histories 100] [--logs 3]
 
 Histories of 200 shifts of five readings with 1 % noise a shift; in one of them something moves by
 3 % after shift 60: at once, over 60 shifts, or until the end. Without a change: another size of the
@@ -18,14 +18,13 @@ import numpy as np
 
 import picchio
 from picchio.ledger.watch.changes import ALARMS, Reading, find
-from picchio.ledger.watch.exchange import exchange
 
 sys.path[:0] = [
     str(Path(__file__).resolve().parents[1] / part) for part in ("tests", "tests/ledger")
 ]
 
 import shift  # noqa: E402
-from test_changes import LOG_MAPPING, no_swaps, shift_log, swapped, swapped_logs  # noqa: E402
+from test_changes import LOG_MAPPING, shift_log  # noqa: E402
 
 DAY = 86_400 * 10**9
 COUNT, BEGIN, SIZE, NOISE = 200, 60, -0.03, 0.01
@@ -43,27 +42,6 @@ def moved(kind):
         return SIZE * (index >= BEGIN)
     length = 60 if kind == "ramp over 60 shifts" else COUNT - BEGIN
     return SIZE * np.clip((index - BEGIN) / length, 0.0, 1.0)
-
-
-def swaps(count: int) -> None:
-    """Fleets of four, of which two robots are swapped; histories in which none is."""
-    told = right = dated = alarms = 0
-    for seed in range(1000, 1000 + count):
-        found, near, late = swapped(seed)
-        alarms += sum(found[n] is not None for n in (2, 3))
-        for a in (0, 1):
-            told += found[a] is not None
-            right += near[a] is not None and near[a][0] == 1 - a
-            dated += late[a] is not None and abs(late[a]) <= 2
-    print(f"{count} swaps of two robots in fleets of four: told of {told} of {2 * count} robots, "
-          f"whose logs they are of {right}, within two shifts of {dated}; told of {alarms} of "
-          f"{2 * count} others (set: {100 * ALARMS:g} %)")  # fmt: skip
-    tally: dict[str, int] = {}
-    for seed in range(1000, 1000 + count):
-        for kind, readings in no_swaps(seed).items():
-            tally[kind] = tally.get(kind, 0) + (exchange(readings) is not None)
-    words = ", ".join(f"{kind}: {number}" for kind, number in tally.items())
-    print(f"no swap, {count} histories each, told as one: {words}")
 
 
 SHIFTS, MOVED = 60, 40
@@ -92,7 +70,7 @@ def from_logs(count: int) -> None:
                     shift_log(logs, number, rng, soft, rub, gap, warm)
                 found = picchio.count(robot, logs, Path(place) / "ledger")
             mine = [c for c in found.changes if target and c["reading"].startswith(target)]
-            others += len(found.changes) - len(mine) + (found.exchange is not None and not target)
+            others += len(found.changes) - len(mine)
             right += bool(mine)
             day = str(np.datetime64(shift.BEGIN + MOVED * DAY, "ns"))[:10]
             dated += any(c["since_low"] <= day <= c["since_high"] for c in mine)
@@ -100,34 +78,12 @@ def from_logs(count: int) -> None:
               f"rightly {dated}, {others} other changes told", flush=True)  # fmt: skip
 
 
-def swaps_in_logs(count: int) -> None:
-    """Fleets of three whose logs of two are swapped, through the whole of `count`."""
-    told = right = dated = alarms = 0
-    for seed in range(count):
-        with tempfile.TemporaryDirectory() as place:
-            rows = swapped_logs(Path(place), SHIFTS, MOVED, seed)
-        found = [rows[name]["another_robot"] for name in ("a", "b")]
-        told += sum(each is not None for each in found)
-        right += sum(each is not None and each["like"] == other
-                     for each, other in zip(found, "ba", strict=True))  # fmt: skip
-        day = [str(np.datetime64(shift.BEGIN + (MOVED + k) * DAY, "ns"))[:10] for k in range(-2, 3)]
-        dated += sum(each is not None and each["since"] in day for each in found)
-        alarms += rows["c"]["another_robot"] is not None
-    print(f"{count} fleets of three, {SHIFTS} logs each, two robots swapped after {MOVED}: told of "
-          f"{told} of {2 * count}, whose logs they are of {right}, within two shifts of "
-          f"{dated}; told of {alarms} of {count} others")  # fmt: skip
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--histories", type=int, default=100)
     parser.add_argument("--logs", type=int, default=0, help="histories of each kind, as logs")
-    parser.add_argument("--swaps", type=int, default=0, help="fleets with swapped logs")
     asked = parser.parse_args()
     count = asked.histories
-    if asked.swaps:
-        swaps_in_logs(asked.swaps)
-        return
     if asked.logs:
         from_logs(asked.logs)
         return
@@ -157,7 +113,6 @@ def main() -> None:
         values = -1e-3 * warmth + NOISE * rng.standard_normal(COUNT)
         readings.append(history(values, "warm", warmth[None]))
         alarms += bool(find(readings))
-    swaps(count)
     print(f"nothing changed: {alarms} of {count} told (set: {100 * ALARMS:g} %)")
 
 

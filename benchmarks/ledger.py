@@ -10,12 +10,10 @@ logs, killed (SIGKILL) after a random time, again and again, then let through.
 from __future__ import annotations
 
 import argparse
-import contextlib
 import signal
 import subprocess
 import sys
 import tempfile
-import threading
 import time
 from pathlib import Path
 
@@ -33,7 +31,6 @@ from picchio.campaign.importing.mapping import read_mapping  # noqa: E402
 from picchio.core.errors import OutputError  # noqa: E402
 from picchio.fatigue.sn.library import load_sn_curve  # noqa: E402
 from picchio.ledger import count as counting  # noqa: E402
-from picchio.ledger.fleet import count_fleet  # noqa: E402
 from picchio.ledger.samples import read_samples  # noqa: E402
 from picchio.ledger.store import Ledger  # noqa: E402
 from picchio.model.model import Model  # noqa: E402
@@ -114,63 +111,16 @@ def kills(folder: Path, count: int, asked: float) -> None:
     )
 
 
-def fleet(folder: Path, robots: int, logs: int) -> None:
-    """So many small logs of each robot on a dask cluster of our own, once more as it is known."""
-    rng = np.random.default_rng(11)
-    for number in range(robots):
-        made = shift.rivets(1, rng, places=2)
-        path = folder / "fleet" / f"robot{number:04d}"
-        path.mkdir(parents=True)
-        (path / "mapping.toml").write_text(shift.MAPPING)
-        for k in range(logs):
-            table = shift.log(made, rng, rate=2000.0, length=2.0)
-            table["stamp"] += k * 600 * 10**9
-            table.to_parquet(path / f"log{k:03d}.parquet")
-    (folder / "ledgers").mkdir()
-    robot, curve = picchio.load_robot(tests.NAME), str(folder / "curve.toml")
-    (folder / "curve.toml").write_text(shift.CURVE)
-    for turn in ("new", "known"):
-        top, ended = [0.0, 0.0], threading.Event()
-        watch = threading.Thread(target=look, args=(top, ended))
-        watch.start()
-        begin = time.perf_counter()
-        found = count_fleet(robot, folder / "fleet", folder / "ledgers", sn_curve=curve, workers=2)
-        ended.set()
-        watch.join()
-        rows = found.robots
-        assert all(row["error"] is None and row["logs"] == logs for row in rows)
-        print(f"{turn}: {robots} robots of {logs} logs each, {sum(r['blows'] for r in rows)} "
-              f"blows, {time.perf_counter() - begin:.0f} s, {top[0]:.0f} MB with the scheduler, "
-              f"{top[1]:.0f} MB the largest worker")  # fmt: skip
-
-
-def look(top: list[float], ended: threading.Event) -> None:
-    """MB of this process and of the largest of its children, until something has ended."""
-    import psutil
-
-    own = psutil.Process()
-    while not ended.wait(0.5):
-        sizes = [own.memory_info().rss]
-        for child in own.children(recursive=True):
-            with contextlib.suppress(psutil.Error):
-                sizes.append(child.memory_info().rss)
-        top[:] = [max(top[0], sizes[0] / 1e6), max(top[1], max(sizes[1:], default=0) / 1e6)]
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--splits", type=int, default=10_000)
     parser.add_argument("--first", type=int, default=0, help="the first split's seed")
     parser.add_argument("--kills", type=int, default=200)
     parser.add_argument("--within", type=float, default=1.5, help="s: a kill comes within these")
-    parser.add_argument("--fleet", type=int, default=0, help="robots on dask")
-    parser.add_argument("--logs", type=int, default=20, help="logs of each of them")
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as place:
         if asked.splits:
             splits(Path(place), asked.splits, asked.first)
-        if asked.fleet:
-            fleet(Path(place), asked.fleet, asked.logs)
         if asked.kills:
             kills(Path(place), asked.kills, asked.within)
 

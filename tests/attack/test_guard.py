@@ -42,8 +42,6 @@ OVER_INPUTS = {
               "raw.csv"),
     "a log in a folder": (f"count {ARM} --log logs --ledger l.ledger --json logs/raw.csv",
                           "logs/raw.csv"),
-    "a log of a fleet": (f"count {ARM} --fleet --log fleet --ledger new --json fleet/one/raw.csv",
-                         "fleet/one/raw.csv"),
     "a logo": ("assess arm.urdf --report r.html --logo logo.svg --json logo.svg", "logo.svg"),
     "a sidecar that is given": ("assess bare.urdf --flex flex.toml --json flex.toml", "flex.toml"),
     "a diagnosis to view": ("view arm.urdf --out v.html --diagnosis a.json --json a.json",
@@ -111,7 +109,6 @@ def given(tmp_path_factory):
     stands = '[blows]\noperation = "forward"\npose = [0.0, 0.5, -0.8]\n'
     text = text.replace('unit = "ms"', start, 1) + stands
     (folder / "logs" / "mapping.toml").write_text(text)
-    shutil.copytree(folder / "logs", folder / "fleet" / "one")
     (folder / "link.stl").write_text(
         "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
         "endloop\nendfacet\nendsolid a\n"

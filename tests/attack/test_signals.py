@@ -41,11 +41,10 @@ COMMANDS = {
     "identify": f"identify {ARM} --data campaign --out i.toml",
     "plan": f"plan {ARM} --budget 20min --with hammer,accelerometer --to sheet",
     "count": f"count {ARM} --log logs --ledger l.ledger --report l.html",
-    "count-fleet": f"count {ARM} --log fleet --fleet --workers 2 --ledger books",
     "reproduce": "reproduce --report rep.html",
 }
 RESUMED = {".m.nc.chunks", ".m.zarr.chunks", ".d.nc.chunks"}
-BOOKS = {"l.ledger", "one.ledger", "two.ledger"}  # kept once a log stands in them
+BOOKS = {"l.ledger"}  # kept once a log stands in them
 MOMENTS = (0.0, 0.3, 1.0, 3.0)  # s; 0: as soon as it can be asked at all
 SIGNALS = {signal.SIGINT: (130, "interrupted"), signal.SIGTERM: (143, "terminated")}
 QUICK = ("map-zarr", "plan")
@@ -57,23 +56,21 @@ def given(tmp_path_factory):
     folder = tmp_path_factory.mktemp("given")
     inputs(folder)
     (folder / "new").mkdir()
-    (folder / "books").mkdir()
     joints = ("joint_1", "joint_2", "joint_3")
     head = ",".join(["time", "force", *joints])
     forces = [300.0 if i % 20 < 2 else 0.0 for i in range(60_000)]
     rows = "".join(f"{1.7e9 + 0.002 * i:.3f},{f},0,0.5,-0.8\n" for i, f in enumerate(forces))
     named = {"force": ("force", "N"), **{j: (f"position.{j}", "rad") for j in joints}}
-    for robot in ("logs", "fleet/one", "fleet/two"):
-        (folder / robot).mkdir(parents=True)
-        (folder / robot / "a.csv").write_text(f"{head}\n{rows}")
-        (folder / robot / "mapping.toml").write_text(
-            'format = "picchio-mapping/1"\nsource.kind = "csv"\n'
-            'time.series = "time"\ntime.unit = "s"\nblows.operation = "forward"\n'
-            + "".join(
-                f'[[channel]]\nfrom = "{name}"\nto = "{to}"\nunit = "{unit}"\n'
-                for name, (to, unit) in named.items()
-            )
+    (folder / "logs").mkdir()
+    (folder / "logs" / "a.csv").write_text(f"{head}\n{rows}")
+    (folder / "logs" / "mapping.toml").write_text(
+        'format = "picchio-mapping/1"\nsource.kind = "csv"\n'
+        'time.series = "time"\ntime.unit = "s"\nblows.operation = "forward"\n'
+        + "".join(
+            f'[[channel]]\nfrom = "{name}"\nto = "{to}"\nunit = "{unit}"\n'
+            for name, (to, unit) in named.items()
         )
+    )
     return folder
 
 

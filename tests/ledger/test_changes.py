@@ -9,12 +9,10 @@ import shift
 from scipy.linalg import eigh
 
 import picchio
-from picchio.ledger.fleet import count_fleet
 from picchio.ledger.samples import Samples
 from picchio.ledger.store import SHIFT, Stream
 from picchio.ledger.watch.changes import FIRST, Reading, Shown, find, readings_of
 from picchio.ledger.watch.drives import drives
-from picchio.ledger.watch.exchange import exchange, signature, whose
 from picchio.ledger.watch.ringing import decaying, ring_downs
 from picchio.model.model import Model
 from worlds import bench, robots
@@ -74,96 +72,6 @@ def test_nothing_is_told_of_histories_in_which_nothing_happens():
 def test_a_short_history_tells_nothing():
     assert find([history(np.linspace(0.0, 1.0, FIRST + 2))]) == []
     assert find([history(np.zeros(100))]) == []
-
-
-ROBOT_READINGS = {"stiffness of joint_1": (0.05, 0.01), "stiffness of joint_2": (0.05, 0.01),
-                  "stiffness of joint_3": (0.05, 0.01), "damping": (0.2, 0.03),
-                  "friction of joint_2": (0.15, 0.03)}  # fmt: skip
-"""By how much robots of a type differ, and a shift of one from the next, as a logarithm."""
-
-
-def of_robots(rng, robots, noise=None):
-    """What shifts show of robots of a type, the k-th shift that of the k-th number."""
-    noise = noise or rng
-    own = {name: rng.normal(0.0, size, 8) for name, (size, _) in ROBOT_READINGS.items()}
-    return {
-        name: own[name][robots] + size * noise.standard_normal(len(robots))
-        for name, (_, size) in ROBOT_READINGS.items()
-    }
-
-
-def as_readings(values):
-    return [history(v, name, name) for name, v in values.items()]
-
-
-def swapped(seed):
-    """Four robots, two of them swapped from some day on: what is told of each, whose logs, when."""
-    fleet, day = {}, 110 + seed % 40
-    for number in range(4):
-        rng = np.random.default_rng(seed)  # the same eight robots
-        robots = np.full(200, number)
-        if number < 2:
-            robots[day:] = 1 - number
-        fleet[number] = as_readings(of_robots(rng, robots, np.random.default_rng([seed, number])))
-    found = {number: exchange(readings) for number, readings in fleet.items()}
-    past = {n: f.before if f else signature(fleet[n]) for n, f in found.items()}
-    near = {n: whose(f, {k: s for k, s in past.items() if k != n}) if f else None
-            for n, f in found.items()}  # fmt: skip
-    late = {n: (f.since - shift.BEGIN) / DAY - day if f else None for n, f in found.items()}
-    return found, near, late
-
-
-def test_two_swapped_robots_are_told_and_whose_logs_they_are():
-    told, right, dated, alarms, words = 0, 0, 0, 0, set()
-    for seed in range(20):
-        found, near, late = swapped(seed)
-        alarms += sum(found[n] is not None for n in (2, 3))
-        for a in (0, 1):
-            told += found[a] is not None
-            right += near[a] is not None and near[a][0] == 1 - a
-            dated += late[a] is not None and abs(late[a]) <= 2
-            words |= {found[a].words.partition("look")[2][:33]} if found[a] else set()
-    assert told >= 33
-    assert min(right, dated) >= 0.9 * told
-    assert alarms <= 3  # 2 % of 40 are 0.8
-    assert words == {" like the logs of another robot, "}
-
-
-def test_a_fleet_says_in_both_rows_whose_logs_they_are():
-    from picchio.ledger.fleet import _told_apart
-
-    found = next(f for k in range(20) if (f := swapped(k)[0])[0] and f[1])
-    rows = [
-        {"name": "left", "another_robot": None, "_exchange": found[0],
-         "_signature": found[0].before},
-        {"name": "right", "another_robot": None, "_exchange": found[1],
-         "_signature": found[1].before},
-        {"name": "new", "another_robot": None, "_exchange": None, "_signature": {}},
-    ]  # fmt: skip
-    _told_apart(rows)
-    assert [r["another_robot"] and r["another_robot"]["like"] for r in rows] == [
-        "right", "left", None
-    ]  # fmt: skip
-    assert rows[0]["another_robot"]["words"].endswith("; they are like those of right")
-    assert not any(key.startswith("_") for row in rows for key in row)
-
-
-def no_swaps(seed):
-    """Readings in which no robot is swapped: noise, one joint breaks, all wear, all are warm."""
-    warmth, index = 20.0 + 5.0 * np.sin(np.arange(200) / 20.0), np.arange(200)
-    noise = of_robots(np.random.default_rng(900 + seed), np.zeros(200, int))
-    joint = "stiffness of joint_2"
-    broken = noise | {joint: noise[joint] - 0.1 * (index > 90)}
-    worn = {n: v - 0.05 * np.clip((index - 60) / 100, 0, 1) for n, v in noise.items()}
-    warm = {n: v - 2e-3 * warmth for n, v in noise.items()}
-    cases = {"noise": as_readings(noise), "a joint 10 % softer": as_readings(broken),
-             "all wear by 5 %": as_readings(worn)}  # fmt: skip
-    return cases | {"warm": [history(v, n, n, covariates=warmth[None]) for n, v in warm.items()]}
-
-
-def test_what_is_no_swap_is_not_told_as_one():
-    alarms = sum(exchange(case) is not None for k in range(15) for case in no_swaps(k).values())
-    assert alarms <= 4  # 2 % of 60 are 1.2
 
 
 def moves(rng, *, friction=1.0, gap=0.0, offset=0.0, seconds=8.0, rate=250.0):
@@ -333,42 +241,6 @@ def shift_log(path, number, rng, softer, friction, gap, warm, *, offset=0.0, dam
     whole.insert(0, "stamp", stamps)
     whole["temp"] = warm
     whole.to_parquet(path / f"{number:03d}.parquet")
-
-
-def swapped_logs(folder, shifts, day, seed):
-    """Three robots of one type, the logs of two of them swapped from a shift on: the fleet's rows.
-
-    Stiffness differs by 5 % a joint, damping by 20 %, friction by 15 %, lost motion by 30 %, and
-    all of them have an offset of the torque of some N m; the hall is as warm for all.
-    """
-    draw = np.random.default_rng([55, seed])
-    cells, books = folder / "cells", folder / "books"
-    books.mkdir()
-    for name in "abc":
-        (cells / name).mkdir(parents=True)
-    (cells / "mapping.toml").write_text(LOG_MAPPING)
-    warmth = 20.0 + 5.0 * np.sin(np.arange(shifts) / 8.0) + draw.standard_normal(shifts)
-    for name in "abc":
-        *soft, damping, rub = np.exp(draw.normal(0.0, [0.05, 0.05, 0.05, 0.2, 0.15]))
-        gap, offset = 1e-4 * np.exp(0.3 * draw.standard_normal()), 8.0 * draw.standard_normal()
-        for number, warm in enumerate(warmth):
-            to = name if number < day else {"a": "b", "b": "a"}.get(name, name)
-            softer = np.array(soft) * (1.0 - 2e-3 * (warm - 20.0))
-            shift_log(cells / to, number, np.random.default_rng([seed, number, ord(name)]),
-                      softer, rub - 0.01 * (warm - 20.0), gap, warm, offset=offset,
-                      damping=damping)  # fmt: skip
-    found = count_fleet(picchio.load_robot(NAME), cells, books)
-    return {row["name"]: row for row in found.robots}
-
-
-@pytest.mark.slow
-def test_logs_of_two_robots_that_are_swapped_are_told(tmp_path):
-    """Logs of simulated robots through the whole of `count`, and a third that stays what it is."""
-    rows = swapped_logs(tmp_path, 40, 34, seed=1)
-    assert [rows[name]["another_robot"]["like"] for name in "ab"] == ["b", "a"]
-    assert rows["c"]["another_robot"] is None
-    dates = {rows[name]["another_robot"]["since"] for name in "ab"}
-    assert dates == {"2026-04-04"}
 
 
 @pytest.mark.slow

@@ -3,10 +3,13 @@
 import json
 import re
 import sqlite3
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas
 import pytest
 import shift
 
@@ -510,9 +513,9 @@ def test_residues_counted_together_are_the_whole_history():
 
 
 @pytest.mark.slow
-def test_a_fleet_has_a_row_a_robot(tmp_path, robot, in_process):
+def test_many_robots_are_a_loop(tmp_path, robot):
+    """The example of the page on counting, in processes of a cluster of its own."""
     rng = np.random.default_rng(12)
-    (tmp_path / "books").mkdir()
     (tmp_path / "cells").mkdir()
     for name, force in (("north", 1500.0), ("south", 2500.0)):
         folder(tmp_path / "cells" / name, shift.rivets(1, rng, force=force), rng)
@@ -520,22 +523,22 @@ def test_a_fleet_has_a_row_a_robot(tmp_path, robot, in_process):
     (tmp_path / "cells" / "broken" / "log.csv").write_text("nothing\n")
     (tmp_path / "cells" / "mapping.toml").write_text(shift.MAPPING)
     (tmp_path / "curve.toml").write_text(shift.CURVE)
-    done = in_process(
-        "count", NAME, "--log", "cells", "--ledger", "books", "--fleet", "--json", "f.json",
-        "--sn-curve", "curve.toml", "--report", "f.html", cwd=tmp_path,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    found = json.loads((tmp_path / "f.json").read_text())
-    assert found["format"] == "picchio-fleet/1"
-    assert [row["name"] for row in found["robots"]] == ["south", "north", "broken"]
-    assert found["robots"][0]["damage"] > 20.0 * found["robots"][1]["damage"] > 0.0
-    assert "log.csv" in found["robots"][2]["error"]
-    assert "not counted: broken" in done.stdout
-    assert sorted(p.name for p in (tmp_path / "books").glob("*.ledger"))[-1] == "south.ledger"
+    code = next(code for code in examples() if code.startswith("# cells.py"))
+    (tmp_path / "cells.py").write_text(code.replace("SN_CURVE = None", 'SN_CURVE = "curve.toml"'))
+    subprocess.run([sys.executable, "cells.py"], cwd=tmp_path, check=True, timeout=300)
+    found = pandas.read_csv(tmp_path / "cells.csv", index_col="robot")
+    assert list(found.index) == ["south", "north", "broken"]
+    assert found.damage["south"] > 20.0 * found.damage["north"] > 0.0
+    assert "log.csv" in found.problem["broken"]
     curve = str(tmp_path / "curve.toml")
     alone = count(robot, tmp_path / "cells/south", tmp_path / "l", sn_curve=curve)
-    assert max(alone.counted.totals.damage) == found["robots"][0]["damage"]
-    assert "south" in (tmp_path / "f.html").read_text()
+    assert found.damage["south"] == pytest.approx(max(alone.counted.totals.damage), rel=1e-12)
+
+
+def examples():
+    """The Python of the page on counting."""
+    text = (Path(__file__).parents[2] / "docs" / "how_to" / "count.md").read_text()
+    return [part.partition("```")[0] for part in text.split("```python\n")[1:]]
 
 
 def test_what_other_programs_read(tmp_path, robot, stretch, monkeypatch):
@@ -543,9 +546,8 @@ def test_what_other_programs_read(tmp_path, robot, stretch, monkeypatch):
     found = count(robot, stretch[2].parent / "logs", tmp_path / "l", sn_curve=str(stretch[2]))
     (tmp_path / "life.json").write_text(json.dumps(found.to_dict()))
     monkeypatch.chdir(tmp_path)
-    text = (Path(__file__).parents[2] / "docs" / "how_to" / "count.md").read_text()
-    codes = [part.partition("```")[0] for part in text.split("```python\n")[1:]]
-    made = {code.split()[1]: code for code in codes if "make_log" not in code}
+    made = {code.split()[1]: code for code in examples() if "make_log" not in code}
+    del made["cells.py:"]
     names: dict[str, dict] = {name: {} for name in made}
     for name in ("prometheus.py", "ros_status.py"):
         exec(made[name], names[name])

@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 
 import picchio
-from picchio.core.errors import InputError, OutputError
-from picchio.ledger import fleet as fleets
+from picchio.core.errors import InputError
 from picchio.ledger.count import count
-from picchio.ledger.store import Ledger
 
 NAME, BEGIN = "fanuc_like_3dof", 1_772_352_000
 POSE = {"q1": 0.3, "q2": 1.1, "q3": -1.0}
@@ -124,46 +122,3 @@ def test_the_pace_is_stated_or_that_of_the_calendar(tmp_path, robot, hours, aske
         assert found.reached(left) == "10 h of work" and found.dates(left)["p50"] is None
     else:
         assert found.dates(left)["p50"][:7] == found.reached(left) == "2026-03"
-
-
-def test_a_fleet_that_could_not_be_written_fails(tmp_path, in_process, monkeypatch):
-    for name in "ab":
-        write(_made(tmp_path / "cells", name), SECOND)
-    (tmp_path / "books").mkdir()
-    call = ("count", NAME, "--log", "cells", "--ledger", "books", "--fleet", "--hours-per-day", "8")
-    monkeypatch.setattr(fleets, "count", _fails(OutputError("cannot be written", file="x")))
-    done = in_process(*call, cwd=tmp_path)
-    assert done.returncode == 1 and done.stderr == "picchio: error: x: cannot be written\n"
-    monkeypatch.setattr(fleets, "count", _fails(InputError("is empty", file="y")))
-    done = in_process(*call, cwd=tmp_path)
-    assert done.returncode == 2 and "no robot could be counted: y: is empty" in done.stderr
-
-
-def test_a_worker_that_is_killed_leaves_no_empty_ledger(tmp_path, robot, monkeypatch):
-    for name in "ab":
-        write(_made(tmp_path / "cells", name), SECOND)
-    (tmp_path / "books").mkdir()
-    real = fleets.count
-
-    def dies_at_the_second(loaded, log, ledger, **options):
-        if log.name == "b":
-            Ledger(ledger, NAME).__enter__()
-            raise KeyboardInterrupt
-        return real(loaded, log, ledger, **options)
-
-    monkeypatch.setattr(fleets, "count", dies_at_the_second)
-    with pytest.raises(KeyboardInterrupt):
-        fleets.count_fleet(robot, tmp_path / "cells", tmp_path / "books")
-    assert [p.name for p in (tmp_path / "books").iterdir()] == [f"a{fleets.ENDING}"]
-
-
-def _made(folder, name):
-    (folder / name).mkdir(parents=True)
-    return folder / name
-
-
-def _fails(error):
-    def call(*_, **__):
-        raise error
-
-    return call

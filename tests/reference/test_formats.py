@@ -109,10 +109,6 @@ def folder(tmp_path_factory):
     rows = [f"{1772352000 + 0.004 * i:.3f},{i % 125 < 99},0.3" for i in range(500)]
     text = "\n".join(["time,on,q", *rows]).replace("True", "1").replace("False", "0")
     (folder / "stamped.csv").write_text(text + "\n")
-    for name in ("robots/a", "robots/b", "books"):
-        (folder / name).mkdir(parents=True)
-    (folder / "robots/a/log.csv").write_text(text + "\n")
-    (folder / "robots/b/log.csv").write_text("nothing\n")
     (folder / "stamped.toml").write_text(
         'format = "picchio-mapping/1"\n[[channel]]\nfrom = "on"\nto = "trigger"\n[[channel]]\n'
         'from = "q"\nto = "position.joint_1"\n[blows]\noperation = "upward"\n'
@@ -142,7 +138,6 @@ FAST = {
     "import": "import log.csv --mapping mapping.toml --to imported",
     "detection": "import log.csv",
     "count": "count fanuc_like_3dof --log stamped.csv --mapping stamped.toml --ledger l",
-    "fleet": "count fanuc_like_3dof --log robots --mapping stamped.toml --ledger books --fleet",
     "annotation": "annotate fanuc_like_3dof --flex {robots}/fanuc_like_3dof/flex.toml --out r.urdf",
     "start": "start ur10 --force",
     "effects": "effects",

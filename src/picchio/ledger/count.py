@@ -33,7 +33,6 @@ from picchio.ledger.samples import Samples, by_names, read_samples
 from picchio.ledger.store import MARGIN, SHIFT, Ledger, Stream, drop_empty
 from picchio.ledger.watch.changes import Shown, find, readings_of
 from picchio.ledger.watch.drives import drives
-from picchio.ledger.watch.exchange import exchange, signature
 from picchio.ledger.watch.ringing import ring_downs, temperatures
 from picchio.model.model import Model, ModelLike
 from picchio.robot.flexible_robot import FlexibleRobot
@@ -129,7 +128,7 @@ def count(
             raise _to_map(error, files[0] if files else None, bare, names) from None
         logs = len(book.logs())
     readings = readings_of(bare.flexible_names, counted.shown)
-    changes, other = find(readings), exchange(readings)
+    changes = find(readings)
     drawn = None
     if counted.blows and any(curve is not None for curve in curves):
         drawn = worlds(unscaled(model), curves, sn_curve, counted, samples, seed)
@@ -140,7 +139,6 @@ def count(
         added=tuple(added), known=tuple(known), refused=tuple(refused), detected=detected,
         counted=counted, worlds=drawn,
         changes=tuple(change.to_dict() for change in changes),
-        exchange=other, signature=signature(readings) if other is None else other.before,
         curves=curves, notes=notes, hours_per_day=hours_per_day,
         origin=provenance(inputs, seed=seed),
     )  # fmt: skip

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -17,7 +16,6 @@ from picchio.core.results import TableResult
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.ledger.counted import HOUR, Counted
 from picchio.ledger.forecast import Worlds, quantiles
-from picchio.ledger.watch.exchange import Exchange
 from picchio.model.model import Model
 
 SECONDS_A_DAY = 86_400
@@ -40,8 +38,6 @@ class Count(TableResult):
         counted: blows and damage.
         worlds: what they may have done; None where nothing was counted.
         changes: what is no longer as it was.
-        exchange: since when these look like another robot's logs; None where they do not.
-        signature: what the robot's own readings are like, see `picchio.ledger.watch.exchange`.
         curves: of the flexible joints.
         notes: what was taken for granted.
         origin: provenance.
@@ -67,8 +63,6 @@ class Count(TableResult):
     counted: Counted
     worlds: Worlds | None
     changes: tuple[dict[str, Any], ...]
-    exchange: Exchange | None
-    signature: Mapping[str, tuple[float, float]]
     curves: tuple[SNCurve | None, ...]
     notes: tuple[str, ...]
     origin: dict[str, Any]
@@ -279,7 +273,6 @@ class Count(TableResult):
                 zip(self.model.robot.flexible_names, self.if_force(0.9), strict=True)
             ),
             "changes": list(self.changes),
-            "another_robot": self.exchange.to_dict() if self.exchange else None,
             "days": self.days(),
             "stations": self.stations(),
             "added": list(self.added),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -36,11 +35,9 @@ from picchio.cli.output import (
 )
 from picchio.core import spoken
 from picchio.core.errors import InputError
-from picchio.core.guard import guard
 from picchio.robot.annotations.flexibility import estimate_notice
 
 if TYPE_CHECKING:
-    from picchio.ledger.fleet import Fleet
     from picchio.ledger.result import Count
     from picchio.studies.tasks import Task
 
@@ -83,18 +80,6 @@ def count(
             metavar="H", help="How long the robot works a day, h: with it, dates follow from hours."
         ),
     ] = None,
-    fleet: Annotated[
-        bool,
-        typer.Option(
-            "--fleet", help="--log holds a folder for each robot, LEDGER is a folder for theirs."
-        ),
-    ] = False,
-    workers: Annotated[
-        int, typer.Option(metavar="N", min=1, help="Processes for a fleet (dask).")
-    ] = 1,
-    scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="A dask scheduler for a fleet.")
-    ] = None,
     seed: Annotated[int, typer.Option(metavar="N", min=0, help="Random seed of the draws.")] = 0,
     report: ReportOption = None,
     json: JsonOption = None,
@@ -111,22 +96,6 @@ def count(
         raise InputError("needs a folder to watch", key="--log")
     with notice_first(json):
         loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
-    if fleet:
-        if not log or len(log) > 1 or watch:
-            raise InputError("needs one --log, and is told as a table, --json or --report",
-                             key="--fleet")  # fmt: skip
-        from picchio.ledger.fleet import count_fleet
-
-        guard.reading(log[0].glob("*/**/*"))  # they are opened in other processes
-
-        with progress("robots") as tick:
-            rows = count_fleet(loaded, log[0], ledger, mapping=mapping, task=task,
-                               sn_curve=sn_curve, seed=seed, hours_per_day=hours_per_day,
-                               workers=workers, scheduler=scheduler, progress=tick)  # fmt: skip
-        write_report(rows, report)
-        deliver(rows.to_dict(), json, lambda: _show_fleet(rows))
-        rows.require_counted()
-        return
     to_write(ledger, "--ledger", added_to=True)
     before: list[tuple[str, int, int]] | None = None
     while True:
@@ -154,28 +123,6 @@ def count(
         if not watch:
             return
         time.sleep(every)
-
-
-def _show_fleet(found: Fleet) -> None:
-    out = console()
-    rows = []
-    for row in found.robots:
-        left = row["blows_left"] or {}
-        rows.append((
-            row["name"], str(row["logs"] or 0), str(row["blows"] or 0), row["joint"] or "-",
-            spoken.per_cent(row["damage"]),
-            spoken.count(math.inf if left.get("p50") is None else left["p50"]) if left else "-",
-            str(len(row["changes"])),
-        ))  # fmt: skip
-    heads = ("robot", ">logs", ">blows", "joint", ">life\nused, %", ">blows left,\nP50", ">changed")
-    out.print(table(heads, rows, title=f"{found.robot}: {found._headline()}"))
-    for row in found.robots:
-        if row["error"]:
-            out.print(styled(f"not counted: {row['name']}", f": {row['error']}"))
-        if row["another_robot"]:
-            out.print(styled(f"another robot? {row['name']}", f": {row['another_robot']['words']}"))
-        for change in row["changes"]:
-            out.print(styled(f"changed: {row['name']}", f": {change['words']}"))
 
 
 def _in_any(file: str | Path | None, logs: list[Path]) -> bool:
@@ -226,8 +173,6 @@ def _show(found: Count, task: Task) -> None:
         out.print(f"Blows as seen: {spoken.number(peak)} N, {wide}{rate}, in the mean.")
     for change in found.changes:
         out.print(styled("changed: ", change["words"], style="bold yellow"))
-    if found.exchange is not None:
-        out.print(styled("another robot? ", found.exchange.words, style="bold yellow"))
     rows = []
     for joint in found.joints():
         left = joint["blows_left"]

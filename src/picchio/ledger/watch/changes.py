@@ -183,15 +183,6 @@ def find(readings: Sequence[Reading], alarms: float = ALARMS) -> list[Change]:
     return sorted(found, key=lambda c: -abs(c.value) / max(c.high - c.low, 1e-12))
 
 
-def scores(reading: Reading) -> FloatArray:
-    """(t,) a reading less what its covariates explain, by the mean and spread of the first shifts.
-
-    Args:
-        reading: of more than `FIRST` shifts.
-    """
-    return _scores(reading.values[None], _covariates(reading))[0]
-
-
 def _covariates(reading: Reading) -> FloatArray:
     """(t, c) a constant, and the covariates that vary."""
     table = np.vstack([np.ones(reading.values.size), reading.covariates]).T

@@ -64,8 +64,7 @@ def count_page(found: Count, *, command: str | None = None, warnings: Sequence[s
         facts=facts, rows=rows, pictures=_pictures(found), places=places,
         place_heads=["Pose|rad", "Force along", "Blows",
                      *(f"{name}|% of its damage" for name in names)],
-        changes=[*([found.exchange.words] if found.exchange else []),
-                 *(change["words"] for change in found.changes)],
+        changes=[change["words"] for change in found.changes],
         refused=[list(pair) for pair in found.refused], notes=found.notes, command=command,
         warnings=list(warnings), provenance=found.origin,
     )  # fmt: skip
