@@ -250,6 +250,18 @@ def test_a_sample(combination, robot, nominal, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", effects())
+def test_every_pair(name, robot, nominal, tmp_path):
+    """Every study with every effect, and either of them with every kind of blows."""
+    kinds, asked = list(excitations()), studies()
+    assert len(asked) >= len(kinds)
+    first, loaded = list(effects()).index(name), {}
+    for k, study in enumerate(asked):
+        check(study, name, kinds[(first + k) % len(kinds)], robot, nominal, tmp_path, loaded)
+
+
+@pytest.mark.slow
+@pytest.mark.minutes
+@pytest.mark.parametrize("name", effects())
 def test_everything(name, robot, nominal, tmp_path):
     loaded: dict[str, dict] = {}
     for study, kind in itertools.product(studies(), excitations()):

@@ -9,6 +9,7 @@ from functools import partial
 DIGITS = 3  # more than these the physics does not deserve
 UNLIMITED = "unlimited"  # a life below the endurance limit, or whatever else nothing bounds
 _ROUNDING = 1e-9  # in any unit that is printed, less than this is rounding
+_FEW = 3  # names that are read faster than counted
 _GROUPED = 1e9  # from here on a power of ten is easier to read than groups of digits
 
 
@@ -77,6 +78,17 @@ def likely(ends: Sequence[float | None]) -> str:
     if all(end is not None and 0.0 <= end < 0.01 for end in ends) and any(ends):
         return "< 1"
     return between(ends, partial(per_cent, digits=2))
+
+
+def those(names: Sequence[str], every: Sequence[str]) -> str:
+    """Joints by name, but "all 6 joints" rather than a list of so many.
+
+    Args:
+        names: those that are meant.
+        every: all that there are.
+    """
+    all_of_many = len(every) > _FEW and set(names) == set(every)
+    return f"all {len(every)} joints" if all_of_many else ", ".join(names)
 
 
 def factor(decades: float) -> str:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from picchio.core import spoken
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError, warn_user
 from picchio.fatigue.miner import life
@@ -273,13 +274,14 @@ def _estimates(robot: FlexibleRobot) -> list[str]:
         if "default" in damping:
             text = f"damping ratio {joint.damping_ratio:g} is assumed ({damping})"
             said.setdefault(text, []).append(joint.name)
-    lines = [f"{', '.join(names)}: {text}" for text, names in said.items()]
+    every = [joint.name for joint in robot.flexible_joints]
+    lines = [f"{spoken.those(names, every)}: {text}" for text, names in said.items()]
     for guessed, names in own.items():
         told = [f"{_ESTIMATED_KEYS[key]} within a factor of {_factors(robot, key, names)}"
                 for key in guessed]  # fmt: skip
         lines.append(
-            f"{', '.join(names)}: estimated from the URDF: {', '.join(told)} (one standard "
-            "deviation; picchio start writes the reasons)"
+            f"{spoken.those(names, every)}: estimated from the URDF: {', '.join(told)} (one "
+            "standard deviation; picchio start writes the reasons)"
         )
     return lines
 

@@ -191,7 +191,7 @@ def judge(found: Assessment) -> Verdict:
     reasons = [*wrong, *map(_failure, over[not wrong :]), *_risks(unsure[risk_first:])]
     # What an estimated drive survives is an interval in the table, and there are many of them.
     reasons += [_wear(part) for part in wearing if not part.joint.estimated_drive]
-    reasons += _told_gaps(gaps)
+    reasons += _told_gaps(gaps, [joint.name for joint in found.joints])
     reasons += found.reducer_warnings
     reasons += found.doubts
     reasons += found.warnings
@@ -405,8 +405,8 @@ def _lacking(gaps: tuple[NotAssessed, ...], part: str) -> list[str]:
     return [gap.joint for gap in gaps if gap.part == part]
 
 
-def _told_gaps(gaps: tuple[NotAssessed, ...]) -> Iterator[str]:
-    """What was not looked at, a line for each kind and reason."""
+def _told_gaps(gaps: tuple[NotAssessed, ...], joints: list[str]) -> Iterator[str]:
+    """What was not looked at of these joints or others, a line for each kind and reason."""
     said: dict[tuple[str, str], list[str]] = {}
     for gap in gaps:
         said.setdefault((gap.part, gap.why), []).append(gap.joint)
@@ -417,7 +417,8 @@ def _told_gaps(gaps: tuple[NotAssessed, ...]) -> Iterator[str]:
         elif part == "effort limit":
             yield f"the effort limit of {told} is {why}"
         else:
-            yield f"{part}{'s' * (part in _PARTS)} not checked in {told}: {why}"
+            where = spoken.those(names, joints)
+            yield f"{part}{'s' * (part in _PARTS)} not checked in {where}: {why}"
 
 
 def _covered(found: Assessment, gaps: tuple[NotAssessed, ...], wearing: list[_Part]) -> str:
