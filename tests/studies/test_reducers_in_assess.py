@@ -130,9 +130,9 @@ def test_the_risk_of_false_brinelling_is_a_class_with_its_indicators(tmp_path):
     two, up = told["joint_2"], found.operations[0]
     assert two["risk"] == "low"
     assert two["travel"] == pytest.approx(up.swing[:, 1].max() * 0.111 / 4.0)
-    assert two["pose"] == int(up.swing[:, 1].argmax())
+    assert two["pose"] == 1 + int(up.swing[:, 1].argmax())  # poses are counted from 1
     assert two["cycles"] == up.swing_cycles[:, 1].max() >= 12
-    assert up.swing[two["pose"], 1] > up.rest_peak_deflection[two["pose"], 1]
+    assert up.swing[two["pose"] - 1, 1] > up.rest_peak_deflection[two["pose"] - 1, 1]
     said = "\n".join(found.reducer_warnings)
     assert "joint_2: risk of false brinelling of the output bearing: low" in said
     ranked = found.to_dict()["false_brinelling"]

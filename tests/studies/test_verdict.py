@@ -175,6 +175,18 @@ def test_report_and_scene_say_the_same(tmp_path):
     assert dataclasses.replace(found, joints=tuple(worn)).verdict.status == "limited"
 
 
+def test_poses_are_counted_from_one_everywhere(tmp_path):
+    robot = arm(tmp_path, GOOD)
+    found = picchio.assess(robot, picchio.task_from_dict(TASK, robot))
+    told = found.to_dict()
+    joint = next(j for j in told["joints"] if j["name"] == told["verdict"]["joint"])
+    place = f"{joint['worst_operation']}, pose {joint['worst_pose']}"
+    assert place in assessment_report(found, robot, picchio.task_from_dict(TASK, robot))
+    assert told["verdict"]["pose"] == found.verdict.pose + 1
+    assert (found.to_frame()["worst_pose"] == [j["worst_pose"] for j in told["joints"]]).all()
+    assert all(entry["pose"] >= 1 for entry in told["false_brinelling"])
+
+
 @pytest.mark.parametrize(
     ("robot", "case", "code"),
     [

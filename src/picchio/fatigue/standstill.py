@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -65,6 +65,10 @@ class FalseBrinelling:
     cycles: float
     pose: int
     why: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain values; the pose counted from 1, as text and tables do."""
+        return vars(self) | {"pose": self.pose + 1}
 
     @property
     def sentence(self) -> str:

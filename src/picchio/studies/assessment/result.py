@@ -175,6 +175,7 @@ class JointLife:
         """The entry as plain values, with "life" and intervals where a value has a spread."""
         hidden = ("spread", "estimated", "intervals", "ends_first")
         own = {key: value for key, value in vars(self).items() if key not in hidden}
+        own["worst_pose"] += 1  # as text and tables count
         own |= {f"{key}_interval": ends for key, ends in self.intervals.items()}
         if not math.isnan(self.ends_first):
             own["ends_first"] = self.ends_first
@@ -408,8 +409,8 @@ class Assessment(TableResult):
     def false_brinelling(self) -> tuple[dict[str, Any], ...]:
         """Joints with a reducer at every pose, by risk of false brinelling, the highest first.
 
-        Each has joint, operation, pose (its index), risk, ratio (travel of a contact of the output
-        bearing over its width) and cycles of the swing in a pass.
+        Each has joint, operation, pose (counted from 1), risk, ratio (travel of a contact of the
+        output bearing over its width) and cycles of the swing in a pass.
         """
         found: list[dict[str, Any]] = []
         for j, joint in enumerate(self.joints):
@@ -420,7 +421,7 @@ class Assessment(TableResult):
                 {
                     "joint": joint.name,
                     "operation": op.name,
-                    "pose": k,
+                    "pose": k + 1,
                     "risk": told.risk,
                     "ratio": float(told.ratio * swing / largest),
                     "cycles": float(op.swing_cycles[k, j] * op.rivets),
@@ -457,6 +458,7 @@ class Assessment(TableResult):
                     "spread", "estimated", "intervals")  # fmt: skip
         return [
             {key: value for key, value in vars(joint).items() if key not in left_out}
+            | {"worst_pose": joint.worst_pose + 1}
             | (joint.spread.quantiles if joint.spread is not None else {})
             | {f"{key}_interval": ends for key, ends in joint.intervals.items()}
             for joint in self.joints

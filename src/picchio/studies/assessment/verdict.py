@@ -23,7 +23,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -97,6 +97,10 @@ class Verdict:
     estimated: bool = False
     covers: tuple[str, ...] = ()
     not_assessed: tuple[NotAssessed, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain values; the pose counted from 1, as text and tables do."""
+        return vars(self) | {"pose": self.pose + 1}
 
     @property
     def promised(self) -> bool:
