@@ -30,6 +30,7 @@ from picchio.studies.default_task import task_of
 
 FORMAT = "picchio-comparison/1"
 _FEW = 4  # values of a table that are shown in its row
+_DIGITS = 4  # one more than elsewhere: what differs shall look different
 _SAME = 1e-9  # relative: what differs by less is rounding
 _VERSION = re.compile(r"picchio-[a-z-]+/1")
 # Not results: what entered and how, prose, and what is told pose by pose.
@@ -450,6 +451,8 @@ def _shown(key: str, side: Mapping[str, Any], first: Any) -> str:
         return "-"
     if isinstance(value, bool):
         return "yes" if value else "no"
+    if last.endswith("_interval") and isinstance(value, list):
+        return spoken.between(value)
     if isinstance(value, list):
         if len(value) <= 4 and not any(isinstance(part, list) for part in value):
             return ", ".join(_text(part) for part in value) or "none"
@@ -461,4 +464,4 @@ def _shown(key: str, side: Mapping[str, Any], first: Any) -> str:
 
 
 def _text(value: Any) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    return spoken.number(value, _DIGITS) if isinstance(value, float) else str(value)
