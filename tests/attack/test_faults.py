@@ -16,6 +16,8 @@ def cells():
                 continue
             slow = output.slow or (output.threads and tried is not faults.read_only)
             marks = [pytest.mark.slow] if slow else []
+            # The paper is reproduced twice for it: before a release.
+            marks += [pytest.mark.minutes] * output.typed.startswith("reproduce")
             yield pytest.param(output, tried, marks=marks, id=f"{output.title}-{fault}")
 
 

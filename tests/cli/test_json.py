@@ -165,9 +165,12 @@ COMMANDS: dict[str, tuple[str, Any]] = {
 }
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=pytest.mark.slow) if n in SLOW else n for n in COMMANDS]
-)
+def marks(name: str) -> list[pytest.MarkDecorator]:
+    """The paper is reproduced by other tests in CI, too."""
+    return [pytest.mark.slow] * (name in SLOW) + [pytest.mark.minutes] * (name == "reproduce")
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=marks(n)) for n in COMMANDS])
 def test_json_is_to_dict(
     name: str, folder: Path, capsys: pytest.CaptureFixture[str], tables: list[Any]
 ) -> None:

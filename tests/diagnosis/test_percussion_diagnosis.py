@@ -195,6 +195,7 @@ def test_what_is_not_in_the_catalogue_is_not_named(kind):
 
 
 @pytest.mark.slow
+@pytest.mark.minutes
 @pytest.mark.timeout(900)
 def test_beside_a_little_of_what_is_unknown_the_known_cause_alone_is_claimed():
     row = trial.run(_case("mixed", "sensor_delay"))

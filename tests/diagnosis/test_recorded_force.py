@@ -131,6 +131,7 @@ def test_a_cause_that_helps_little_held_out_is_dropped_where_little_was_left(
 
 
 @pytest.mark.slow
+@pytest.mark.minutes
 @pytest.mark.parametrize("draw", [91201, 91206])
 def test_nothing_wrong_is_nothing_wrong(arm, draw):
     """In draw 91206 the slopes of all records say nothing of values that fewer have told."""

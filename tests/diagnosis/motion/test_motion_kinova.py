@@ -85,6 +85,7 @@ def value(diagnosis, effect, name):
     return next(c for c in diagnosis.causes if c.effect == effect).parameters[name].value
 
 
+@pytest.mark.minutes
 def test_without_payload_in_the_catalogue_no_wrong_name(robot, kinova, diagnosis):
     """What hangs at the flange and a heavier last link make the same torques: one class."""
     other = diagnose_motion(robot, kinova, without=["payload", "payload_body", "link_inertia"])
@@ -93,6 +94,7 @@ def test_without_payload_in_the_catalogue_no_wrong_name(robot, kinova, diagnosis
     assert labels(other) < labels(diagnosis)
 
 
+@pytest.mark.minutes
 def test_the_smallest_payload_that_is_found(robot, kinova, diagnosis, repository):
     urdf = str(repository / "robots" / "kinova_gen3" / "robot.urdf")
     found = diagnose_motion(robot, injection.inject(kinova, injection.payload(urdf, "tool0", 0.25)))

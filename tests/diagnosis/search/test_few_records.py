@@ -26,7 +26,12 @@ def arm():
         # Some blows' times were found only once a second cause stood beside.
         pytest.param("pulse_jitter", 0, {}, marks=pytest.mark.slow),
         # The blows' shape came with it, by what the model is not exact to.
-        pytest.param("mount_resonance", 0, {"frequency": 0.002}, marks=pytest.mark.slow),
+        pytest.param(
+            "mount_resonance",
+            0,
+            {"frequency": 0.002},
+            marks=(pytest.mark.slow, pytest.mark.minutes),
+        ),
         # The blow is missing late in one record: the first part of both showed nothing.
         ("missed_hits", 1, {}),
         # Two records that were fitted say drift as well; the one held out knows better.

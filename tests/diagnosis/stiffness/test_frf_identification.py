@@ -224,6 +224,7 @@ def test_bad_functions_are_named(frfs):
 
 
 @pytest.mark.slow
+@pytest.mark.minutes
 def test_a_step_to_masses_that_no_arm_has_is_shortened(frfs):
     """Met blind: it ended with a matrix that is not positive definite."""
     world = frfs.draw(7, 92075)
