@@ -153,6 +153,7 @@ def test_what_is_wrong_is_named(arm):
     assert abs(gain.value - hidden["parameters"]["gain"]) < 4.0 * gain.std < 0.2
 
 
+@pytest.mark.minutes
 @pytest.mark.slow
 @pytest.mark.parametrize(("seed", "late", "within"), [(91300, 2e-3, 2e-6), (91301, 6e-4, 5e-6)])
 def test_a_force_sensor_that_is_late_is_told_as_that(arm, worlds, seed, late, within):

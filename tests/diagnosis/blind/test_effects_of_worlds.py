@@ -196,6 +196,7 @@ def test_a_load_away_from_the_tool_frame_is_the_worlds(robot, monkeypatch):
     assert left(robot, ("load", "tool", {"mass": 4.0}), effect) < 0.0005
 
 
+@pytest.mark.minutes
 @pytest.mark.slow
 def test_a_load_away_from_the_tool_frame_is_found_from_blows(robot, monkeypatch):
     monkeypatch.setitem(outside.EFFECTS, "load", off_centre)

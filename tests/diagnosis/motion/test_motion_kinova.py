@@ -102,12 +102,14 @@ def test_the_smallest_payload_that_is_found(robot, kinova, diagnosis, repository
     assert more == pytest.approx(0.25, abs=0.03)
 
 
+@pytest.mark.minutes
 def test_the_smallest_delay_that_is_found(robot, kinova, diagnosis):
     found = diagnose_motion(robot, injection.inject(kinova, injection.delay("torque", 0.001)))
     more = value(found, "encoder_delay", "delay") - value(diagnosis, "encoder_delay", "delay")
     assert more == pytest.approx(0.001, abs=0.05e-3)
 
 
+@pytest.mark.minutes
 def test_the_smallest_ripple_that_is_found(robot, kinova):
     """5 cycles a motor turn, 0.05 N m of 0.4 N m that shake joint 6."""
     changed = injection.inject(kinova, injection.ripple("joint_6", 500.0, 0.05))

@@ -12,6 +12,7 @@ pytestmark = pytest.mark.slow
 STANDS_IN = pytest.mark.xfail(
     strict=True, reason="friction of joint_a3 that differs by direction is named for an offset"
 )
+MINUTES = pytest.mark.minutes
 AXES = ("joint_a1", "joint_a2", "joint_a3")
 
 
@@ -89,8 +90,8 @@ def test_without_delay_in_the_catalogue_no_wrong_name(robot, kuka):
 @pytest.mark.parametrize(
     ("gone", "instead"),
     [
-        ("viscous_friction", {("load_friction", "joint_a3")}),
-        ("joint_inertia", {("torque_gain", "joint_a1")}),
+        pytest.param("viscous_friction", {("load_friction", "joint_a3")}, marks=MINUTES),
+        pytest.param("joint_inertia", {("torque_gain", "joint_a1")}, marks=MINUTES),
         ("joint_stiffness", set()),
         pytest.param("torque_offset", set(), marks=STANDS_IN),
     ],
@@ -104,7 +105,9 @@ def test_without_a_cause_the_verdict_stays_partial(robot, kuka, diagnosis, gone,
     assert labels[1] - labels[0] == instead
 
 
-@pytest.mark.parametrize("more", [0.0001, 0.001, 0.004])
+@pytest.mark.parametrize(
+    "more", [pytest.param(0.0001, marks=MINUTES), 0.001, pytest.param(0.004, marks=MINUTES)]
+)
 def test_an_injected_delay_adds_to_the_one_there(robot, kuka, diagnosis, more):
     changed = injection.inject(kuka, injection.delay("position", more))
     found = diagnose_motion(robot, changed).causes[0]
@@ -114,7 +117,7 @@ def test_an_injected_delay_adds_to_the_one_there(robot, kuka, diagnosis, more):
     assert found.parameters["delay"].value - own == pytest.approx(more, abs=0.03e-3)
 
 
-@pytest.mark.parametrize("added", [15.0, 30.0])
+@pytest.mark.parametrize("added", [15.0, pytest.param(30.0, marks=MINUTES)])
 def test_an_injected_payload_adds_to_the_one_there(robot, kuka, diagnosis, repository, added):
     urdf = str(repository / "robots" / "kuka_kr300_r2500" / "robot.urdf")
     change = injection.payload(urdf, "tool0", added, "motor_position")
@@ -124,6 +127,7 @@ def test_an_injected_payload_adds_to_the_one_there(robot, kuka, diagnosis, repos
     assert mass[1] - mass[0] == pytest.approx(added, abs=2.0)
 
 
+@pytest.mark.minutes
 def test_an_injected_ripple_is_found_beside_its_own_side_lobes(robot, kuka):
     """300 cycles a radian, to and fro over 0.8 rad: 38 periods, in a band that shakes as much."""
     change = injection.ripple("joint_a1", 300.0, 150.0, "motor_position")

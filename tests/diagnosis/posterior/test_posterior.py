@@ -36,6 +36,7 @@ def test_nothing_hidden_is_nothing_wrong():
     assert judged.odds < 3.0
 
 
+@pytest.mark.minutes
 @pytest.mark.parametrize(
     ("effect", "target", "values", "within"),
     [

@@ -342,6 +342,7 @@ def test_where_every_fine_step_meets_a_jump_the_coarse_slope_stands(wrong_everyw
     assert np.abs(found[:, k]).max() == pytest.approx(1e3, rel=0.5)
 
 
+@pytest.mark.minutes
 @pytest.mark.slow
 def test_records_held_out_are_found_though_a_gap_makes_small_errors_large():
     """In a record in which an error grows a hundred thousand times its own numbers tell it alone.
@@ -469,6 +470,7 @@ def test_a_world_that_is_a_little_wrong_leaves_noise(wrong_everywhere):
     assert (spread[:3] > 0.003).all() and (spread[:3] < 0.03).all()
 
 
+@pytest.mark.minutes
 @pytest.mark.slow
 def test_a_world_of_six_joints_leaves_noise():
     """Fast wrists tell a centre of mass to the second order, and lead slopes far astray."""
@@ -583,6 +585,7 @@ def test_products_of_slopes_stay_theirs(wrong_everywhere):
         assert fewer.gram == pytest.approx(slopes.gram[-len(fewer.what) :, -len(fewer.what) :])
 
 
+@pytest.mark.minutes
 @pytest.mark.slow
 def test_a_blow_that_rises_slowly_is_one_that_rises_slowly():
     """Fast modes tell a rise from a delay: as a delay, half a millisecond passed for a rebound."""
