@@ -45,6 +45,42 @@ def test_every_way_to_give_a_robot_gives_the_same_rigid_robot(name: str) -> None
         np.testing.assert_allclose(bare.rigid.mass_matrix(at), mass, rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.filterwarnings("ignore::picchio.PicchioWarning")
+@pytest.mark.parametrize("name", NAMES)
+def test_yourdfpy_puts_every_link_where_picchio_does(name: str) -> None:
+    robot = picchio.load_robot(name)
+    held = robot.urdf
+    pose = robot.pose(np.linspace(0.01, 0.04, len(robot.joint_names)))
+    held.update_cfg(dict(zip(robot.joint_names, pose, strict=True)))
+    base, turned = robot.frame_placement(pose, held.base_link)
+    for link in held.link_map:
+        at, rotation = robot.frame_placement(pose, link)
+        seen = held.get_transform(link)
+        np.testing.assert_allclose(turned @ seen[:3, 3] + base, at, atol=1e-9)
+        np.testing.assert_allclose(turned @ seen[:3, :3], rotation, atol=1e-9)
+    drawn = [v for link in held.link_map.values() for v in link.visuals]
+    assert len(held.scene.geometry) >= len(drawn) > 0
+    again = picchio.load_robot(held)
+    assert again.joint_names == robot.joint_names
+
+
+def test_what_yourdfpy_gets_has_quaternions_turned_and_no_capsule(tmp_path: Path) -> None:
+    shape = "<visual><origin {}/><geometry>{}</geometry></visual>"
+    text = picchio.load_robot(ARM).source.read_text()
+    turned = shape.format('quat_xyzw="0 0 0.6 0.8"', '<box size="1 1 1"/>')
+    round_ends = shape.format("", '<capsule radius="0.1" length="1"/>')
+    for name, part in (("turned", turned), ("capsule", round_ends)):
+        more = (
+            f'<link name="more">{part}</link><joint name="on" type="fixed">'
+            '<parent link="link_1"/><child link="more"/></joint></robot>'
+        )
+        (tmp_path / f"{name}.urdf").write_text(text.replace("</robot>", more))
+    (box,) = picchio.load_robot(tmp_path / "turned.urdf").urdf.link_map["more"].visuals
+    np.testing.assert_allclose(box.origin[:2, 0], [1 - 2 * 0.36, 2 * 0.48], atol=1e-9)
+    with pytest.raises(picchio.InputError, match=r"capsule\.urdf.*yourdfpy"):
+        _ = picchio.load_robot(tmp_path / "capsule.urdf").urdf
+
+
 def test_a_name_goes_where_a_robot_goes() -> None:
     robot = picchio.load_robot(ARM)
     task = picchio.load_task(robot.task_path, ARM)

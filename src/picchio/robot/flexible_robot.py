@@ -27,6 +27,7 @@ from picchio.robot.urdf.tree import UrdfTree
 
 if TYPE_CHECKING:
     import pandas
+    import yourdfpy
 
 Array = NDArray[np.float64]
 _MATTERS = 0.05  # of a weight or an inertia: less is within what models are off by
@@ -199,6 +200,19 @@ class FlexibleRobot(Shown):
                 for name in self.joint_names
             },
         )
+
+    @property
+    def urdf(self) -> yourdfpy.URDF:
+        """The file as `yourdfpy` has it: links, joints, meshes, collision shapes, a trimesh scene.
+
+        Read anew each time, so that changing it changes no robot.
+
+        Raises:
+            InputError: what yourdfpy has no room for, such as a capsule.
+        """
+        from picchio.robot.urdf.by_yourdfpy import as_yourdfpy
+
+        return as_yourdfpy(self.source)
 
     def _seen(self) -> Mapping[str, Any]:
         return {"robot": self}
