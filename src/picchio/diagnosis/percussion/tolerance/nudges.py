@@ -8,7 +8,7 @@ differences.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -160,9 +160,6 @@ def inexact(
     tolerance = tolerance.model_copy(update=wider)
     found = [one for make in makers for one in make(problem, record, tolerance)]
     return sorted((one for one in found if getattr(tolerance, one.key) > 0.0), key=lambda x: x.once)
-
-
-Maker = Callable[[Problem, MeasuredRecord, Tolerance], Iterator[Inexact]]
 
 
 def _links(problem: Problem, record: MeasuredRecord, sigma: Tolerance) -> Iterator[Inexact]:

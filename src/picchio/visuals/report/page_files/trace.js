@@ -45,7 +45,8 @@ function first(time, t) {
 function ticks(from, to, count) {
   const raw = (to - from) / count || 1, size = 10 ** Math.floor(Math.log10(raw));
   const step = [1, 2, 5, 10].find((f) => f * size >= raw) * size, found = [];
-  for (let t = Math.ceil(from / step) * step; t <= to + 1e-9 * step; t += step) found.push(t);
+  for (let t = Math.ceil(from / step) * step; t <= to + 1e-9 * step; t += step)
+    found.push(Math.abs(t) < 1e-9 * step ? 0 : t);
   return found;
 }
 

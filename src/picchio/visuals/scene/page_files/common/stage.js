@@ -33,6 +33,9 @@ function look(view) {
   const [at, to] = data.camera.map((p) => new THREE.Vector3(...p)), far = at.distanceTo(to);
   const way = { x: [1, 0, 0.001], y: [0, -1, 0.001], z: [0, -0.001, 1] }[view];
   if (way) at.set(...way).multiplyScalar(far).add(to);
+  // It is placed for a pane as wide as high: from farther away a narrow one shows as much.
+  const pane = byId("pane");
+  at.sub(to).multiplyScalar(Math.max(1, pane.offsetHeight / pane.offsetWidth)).add(to);
   // The camera's node is turned: its y is the world's z.
   viewer.camera.position.set(at.x, at.z, -at.y);
   viewer.controls.target.set(to.x, to.z, -to.y);
