@@ -178,9 +178,16 @@ def test_every_function_is_called_here(tmp_path: Path) -> None:
 
 @pytest.mark.filterwarnings("ignore::picchio.PicchioWarning")
 @pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=pytest.mark.slow) if n in SLOW else n
-             for n in sorted(FUNCTIONS)],
-)  # fmt: skip
+    "name",
+    [
+        pytest.param(
+            name,
+            marks=[pytest.mark.slow] * (name in SLOW)
+            + [pytest.mark.minutes] * (name == "reproduce"),
+        )
+        for name in sorted(FUNCTIONS)
+    ],
+)
 def test_what_a_function_returns(name: str, tmp_path: Path) -> None:
     modules()
     found = calls(tmp_path)[name]()

@@ -259,7 +259,7 @@ def test_the_median_band_without_a_knee_is_a_regression_band() -> None:
 
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
-@pytest.mark.parametrize("number", [30, 100])
+@pytest.mark.parametrize("number", [30, pytest.param(100, marks=pytest.mark.minutes)])
 def test_intervals_cover_what_they_say(number: int) -> None:
     """90 % intervals hold the truth in 88 to 92 % of sets.
 

@@ -160,7 +160,14 @@ def test_what_a_command_writes_is_described(name, line, folder, repository):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "line"), SLOW.items(), ids=list(SLOW))
+@pytest.mark.parametrize(
+    ("name", "line"),
+    [
+        pytest.param(*item, marks=[pytest.mark.minutes] * (item[0] == "reproduction"))
+        for item in SLOW.items()
+    ],
+    ids=list(SLOW),
+)
 def test_what_a_long_command_writes_is_described(name, line, folder, repository):
     assert_described(written(folder, line, repository), name)
 

@@ -248,7 +248,7 @@ def test_bad_input(arm, panel):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["ur10", "panda"])
+@pytest.mark.parametrize("name", ["ur10", pytest.param("panda", marks=pytest.mark.minutes)])
 def test_arms_of_six_and_seven_joints_against_a_brute_force_grid(name):
     """A small panel; shafts assumed, so that there is a life. Roll and null space are free."""
     robot, task = placement_grid.small_panel(name)

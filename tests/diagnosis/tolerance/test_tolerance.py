@@ -626,7 +626,10 @@ def test_a_remainder_counts_by_its_power():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "draw"), [("null", 0), ("null", 1), ("single", 1)])
+@pytest.mark.parametrize(
+    ("kind", "draw"),
+    [("null", 0), pytest.param("null", 1, marks=pytest.mark.minutes), ("single", 1)],
+)
 def test_worlds_that_are_a_little_wrong_everywhere(kind, draw, tmp_path):
     """Nothing wrong, and a hidden effect, on seeds that were used while building."""
     case = {"robot": ARM, "kind": kind, "effect": None, "snr": 40, "draw": draw, "mismatch": 1.0}
