@@ -86,6 +86,9 @@ def those(names: Sequence[str], every: Sequence[str]) -> str:
     Args:
         names: those that are meant.
         every: all that there are.
+
+    Returns:
+        such as "joint_1, joint_2".
     """
     all_of_many = len(every) > _FEW and set(names) == set(every)
     return f"all {len(every)} joints" if all_of_many else ", ".join(names)
