@@ -79,6 +79,13 @@ def test_what_yourdfpy_gets_has_quaternions_turned_and_no_capsule(tmp_path: Path
     np.testing.assert_allclose(box.origin[:2, 0], [1 - 2 * 0.36, 2 * 0.48], atol=1e-9)
     with pytest.raises(picchio.InputError, match=r"capsule\.urdf.*yourdfpy"):
         _ = picchio.load_robot(tmp_path / "capsule.urdf").urdf
+    lost = shape.format("", '<mesh filename="lost.stl"/>')
+    more = f'<link name="more">{lost}</link><joint name="on" type="fixed">'
+    more += '<parent link="link_1"/><child link="more"/></joint></robot>'
+    (tmp_path / "lost.urdf").write_text(text.replace("</robot>", more))
+    robot = picchio.load_robot(tmp_path / "lost.urdf")
+    with pytest.warns(picchio.PicchioWarning, match=r"link 'more': a <visual> is left out.*lost"):
+        assert robot.urdf.link_map["more"].visuals == []
 
 
 def test_a_name_goes_where_a_robot_goes() -> None:

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 from lxml import etree
 
-from picchio.core.errors import InputError
+from picchio.core.errors import InputError, warn_user
 from picchio.robot.urdf.addresses import resolve_mesh
 from picchio.robot.urdf.tree import read_origin
-from picchio.robot.urdf.xml import parse_urdf, read_urdf_bytes
+from picchio.robot.urdf.xml import children, parse_urdf, read_urdf_bytes
 
 if TYPE_CHECKING:
     import yourdfpy
@@ -21,7 +21,7 @@ def as_yourdfpy(file: Path) -> yourdfpy.URDF:
     """Links, joints, meshes and collision shapes, with a trimesh scene of them.
 
     Args:
-        file: of the URDF; meshes are found as everywhere, those that are missing are left out.
+        file: of the URDF; meshes are found as everywhere, and a warning names each that is missing.
 
     Returns:
         the file's robot, apart from ours: changing it changes nothing else.
@@ -32,17 +32,20 @@ def as_yourdfpy(file: Path) -> yourdfpy.URDF:
     import yourdfpy
 
     root = parse_urdf(read_urdf_bytes(file), file)
-    for origin in root.iter("origin"):
-        xyz, rpy = read_origin(origin.getparent())  # a quaternion among them
-        origin.attrib.pop("quat_xyzw", None)
-        for key, values in (("xyz", xyz), ("rpy", rpy)):
-            origin.set(key, " ".join(repr(float(value)) for value in values))
+    for part in root.iter("joint", "inertial", "visual", "collision"):
+        for origin in children(part, "origin"):
+            xyz, rpy = read_origin(part)  # a quaternion among them
+            origin.attrib.pop("quat_xyzw", None)
+            for key, values in (("xyz", xyz), ("rpy", rpy)):
+                origin.set(key, " ".join(repr(float(value)) for value in values))
     for part in [*root.iter("visual"), *root.iter("collision")]:
         for mesh in part.iter("mesh"):
             try:
                 mesh.set("filename", str(resolve_mesh(mesh.get("filename", ""), file.parent)))
-            except InputError:
-                part.getparent().remove(part)
+            except InputError as error:
+                link = part.getparent()
+                link.remove(part)
+                warn_user(f"link {link.get('name')!r}: a <{part.tag}> is left out: {error}")
     try:
         return yourdfpy.URDF.load(
             io.BytesIO(etree.tostring(root)),
