@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 import re
 from html import unescape
 from pathlib import Path
@@ -15,6 +16,7 @@ from PIL import Image
 from scipy.integrate import solve_ivp
 
 import picchio
+from picchio.visuals.plots.diagnosis import AFTER, BEFORE
 from picchio.visuals.report.assessment import assessment_report
 from picchio.visuals.report.trace import Trace, traces_html
 
@@ -39,6 +41,14 @@ def test_what_a_page_holds_is_what_was_given_and_what_did_not_fit_is_told() -> N
         reach = np.nanmax(given) - np.nanmin(given)
         np.testing.assert_allclose(one["lines"]["measured"], given, atol=reach / 65000)
     assert str(traces_html([], "nothing")) == ""
+
+
+def test_before_and_after_have_the_colours_of_the_plots() -> None:
+    values = {name: np.zeros(3) for name in ("measured", "before", "after")}
+    page = str(traces_html([Trace("r", "force", "N", np.arange(3.0), values)], "title"))
+    text = page.partition('<script type="application/json">')[2].partition("</script>")[0]
+    ink, *rest = json.loads(text)["colours"]
+    assert (ink, *rest[:2]) == ("currentColor", BEFORE["color"], AFTER["color"])
 
 
 def test_the_reports_trace_is_the_motion_of_the_arm(arm: SimpleNamespace) -> None:

@@ -110,10 +110,12 @@ def _percussion(found: PercussionDiagnosis, also_motion: bool) -> dict[str, Any]
     diagnosis, problem = found.diagnosis, found.problem
     figures = PercussionFigures(found)
     poses = f"{problem.n_poses} pose{'s' if problem.n_poses != 1 else ''}"
+    taken = len(problem.records)
+    records = f"{taken} percussion record{'s' if taken != 1 else ''}"
     others = " and of motion records" if also_motion else ""
     return {
         "figures": figures,
-        "taken": f"{len(problem.records)} percussion records at {poses}{others}",
+        "taken": f"{records} at {poses}{others}",
         "cards": [_card(problem.robot, cause) for cause in diagnosis.causes],
         "before": found.before,
         "after": found.after,

@@ -10,10 +10,15 @@ import numpy as np
 from markupsafe import Markup, escape
 
 from picchio.core.arrays import FloatArray
+from picchio.visuals.plots.diagnosis import AFTER, BEFORE
+from picchio.visuals.plots.style import GREEN, PURPLE
 from picchio.visuals.scene.page import Packer, script_json
 
 MOST = 400_000
 """Values of one figure: about 1 MB of the page; channels beyond are left out, and told."""
+
+
+_COLOURS = ("currentColor", BEFORE["color"], AFTER["color"], GREEN, PURPLE)  # as plots have them
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +69,7 @@ def traces_html(traces: Sequence[Trace], title: str, *, most: int = MOST) -> Mar
     left = len(traces) - len(kept)
     note = f" The last {left} of {len(traces)} channels are not in this page." if left else ""
     script = (files("picchio.visuals.report") / "page_files" / "trace.js").read_text("utf-8")
-    content = script_json({"title": title, "traces": kept})
+    content = script_json({"title": title, "traces": kept, "colours": _COLOURS})
     return Markup(
         '<figure class="wide trace screen-only"><div class="tools"></div><div class="drawn"></div>'
         f"<figcaption>{escape(title)}. Drag along the time to zoom, double-click for all of it; "

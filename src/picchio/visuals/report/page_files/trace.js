@@ -7,7 +7,7 @@ const bytes = Uint8Array.from(atob(packed.textContent), (c) => c.charCodeAt(0));
 const buffer = await new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"))).arrayBuffer();
 const array = ([kind, offset, count]) => new { f4: Float32Array, u2: Uint16Array }[kind](buffer, offset, count);
 const NS = "http://www.w3.org/2000/svg", W = 900, H = 300, L = 64, R = 12, T = 10, B = 34;
-const COLOURS = ["currentColor", "#0072b2", "#d55e00", "#009e73", "#cc79a7"];
+const COLOURS = data.colours;
 const own = new Map();
 const state = { k: 0, from: 0, to: 1, off: new Set(), at: null };
 
