@@ -142,3 +142,28 @@ def test_asked_to_end(given, name, number, moment):
     finally:
         for path in sorted(left, reverse=True):
             path.rmdir() if path.is_dir() else path.unlink(missing_ok=True)  # SQLite tidies up
+
+
+@pytest.mark.parametrize("number", list(SIGNALS))
+@pytest.mark.parametrize("module", ["json", "picchio.cli.running"])
+def test_what_fails_because_it_was_asked_to_end_ends(number, module):
+    """A library that is interrupted in the midst of its import says that something is wrong."""
+    asked = f"""
+import sys, os, time
+sys.modules.pop("json", None)
+class Finder:
+    def find_spec(self, name, path=None, target=None):
+        if name == {module!r}:
+            try:
+                os.kill(os.getpid(), {int(number)})
+                time.sleep(5)
+            except BaseException:
+                pass
+            raise RuntimeError("the schema is wrong")
+sys.meta_path.insert(0, Finder())
+from picchio.cli.main import main
+main(["robots", "--json", "-"])
+"""
+    done = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True)
+    code, word = SIGNALS[number]
+    assert (done.returncode, done.stderr) == (code, f"picchio: error: {word}\n")

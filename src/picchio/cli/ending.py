@@ -63,7 +63,8 @@ class Ending:
         if at_last and kept:
             self._guard()
         try:
-            yield
+            with self.meant():
+                yield
         finally:
             self.heard()
             if at_last:
@@ -71,6 +72,22 @@ class Ending:
             else:
                 for number, handler in kept.items():
                     signal.signal(number, handler)
+
+    @contextmanager
+    def meant(self) -> Iterator[None]:
+        """Whatever fails within the block once it was asked to end, ends.
+
+        A library that is interrupted in the midst of its import says that its schema is wrong.
+
+        Returns:
+            a context manager.
+        """
+        try:
+            yield
+        except Exception as error:
+            if self._asked is None:
+                raise
+            raise _RAISED[self._asked] from error
 
     def heard(self) -> None:
         """It was dealt with: what comes now is to be finished."""

@@ -96,7 +96,7 @@ def run(arguments: list[str] | None = None) -> int:
 def _watched(arguments: Sequence[str]) -> Any:
     """Run a command with a bar for long work; say what it wrote, even if it then failed."""
     try:
-        with waiting.watched():
+        with waiting.watched(), ending.meant():
             return app(args=arguments, prog_name="picchio", standalone_mode=False)
     finally:
         guard.begin(listen=False)  # what comes after the command is no matter of it
