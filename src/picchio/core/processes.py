@@ -10,6 +10,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -140,8 +141,14 @@ def one_thread() -> Iterator[None]:
     Returns:
         a context manager, or a decorator of a function that computes.
     """
-    import scipy.linalg  # noqa: F401  # a library that is not loaded yet cannot be limited
-    from threadpoolctl import threadpool_limits
-
-    with threadpool_limits(1, user_api="blas"):
+    with _linear_algebra().limit(limits=1, user_api="blas"):
         yield
+
+
+@cache
+def _linear_algebra() -> Any:
+    """The libraries' threads; looking for them takes 5 ms."""
+    import scipy.linalg  # noqa: F401  # a library that is not loaded yet cannot be limited
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()

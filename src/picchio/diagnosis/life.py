@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from picchio.core.arrays import FloatArray
+from picchio.core.arrays import FloatArray, IndexArray
 from picchio.core.errors import InputError
 from picchio.core.processes import one_thread
 from picchio.core.recent import Recent
@@ -30,7 +30,7 @@ LEVEL = 0.90
 NO_SHAFT = "no joint has a shaft or a reducer, so no life can be told: give them in the sidecar"
 """Why there is no life where there is none."""
 
-# Poses of each operation and joint that slopes are taken at, the most strained ones.
+# Poses of each operation and joint where design points are looked for, the most strained ones.
 _WORST = 2
 # Poses whose geometry is kept while all values are looked at there.
 _KEPT = 64
@@ -251,7 +251,7 @@ def life_intervals(
     Raises:
         InputError: as `assess`.
     """
-    worst = _most_strained(task, found)
+    worst, single = _most_strained(task, found), _most_strained_of_all(task, found)
     z = NormalDist().inv_cdf(0.5 + 0.5 * LEVEL)
     settings = {**options, "steady_check": False, "uncertainty": False}
     bare = Model(robot, geometries=Recent(_KEPT))
@@ -265,11 +265,9 @@ def life_intervals(
         except InputError:
             return None
 
-    centre = at(unsure.centre)
-    if centre is None:
-        return {}
-    told_there = centre if unsure.told is None else at(unsure.told)
-    if told_there is None:
+    centre = at(unsure.centre, single)
+    told_there = at(unsure.centre if unsure.told is None else unsure.told)
+    if centre is None or told_there is None:
         return {}
     reference = told_there[0]
     sizes, directions = np.linalg.eigh(unsure.covariance)
@@ -277,7 +275,7 @@ def life_intervals(
     spread = spread[:, np.sqrt(np.maximum(sizes, 0.0)) > _KNOWN]
 
     def slope(step: FloatArray) -> FloatArray | None:
-        return _slope(unsure, step, at, *centre)
+        return _slope(unsure, step, lambda vector: at(vector, single), *centre)
 
     def used(asked: tuple[int, FloatArray]) -> float | None:
         j, point = asked
@@ -377,9 +375,23 @@ def _strain(found: Assessment) -> tuple[FloatArray, FloatArray]:
 
 def _most_strained(task: Task, found: Assessment) -> Task:
     """The task with every operation's and joint's most strained poses alone."""
-    operations = []
-    for operation, result in zip(task.operations, found.operations, strict=True):
-        ranked = np.argsort(np.nan_to_num(result.utilisation), axis=0)[-_WORST:]
-        kept = np.unique(ranked)
-        operations.append(replace(operation, poses=operation.poses[kept]))
-    return replace(task, operations=tuple(operations))
+    ranked = [np.argsort(np.nan_to_num(r.utilisation), axis=0) for r in found.operations]
+    return _at_poses(task, [np.unique(order[-_WORST:]) for order in ranked])
+
+
+def _most_strained_of_all(task: Task, found: Assessment) -> Task:
+    """The task with every joint's most strained pose alone, where slopes are taken."""
+    used = [np.nan_to_num(result.utilisation) for result in found.operations]
+    where = np.concatenate([np.full(len(each), k) for k, each in enumerate(used)])
+    which = np.concatenate([np.arange(len(each)) for each in used])
+    worst = np.unique(np.argmax(np.concatenate(used), axis=0))
+    return _at_poses(task, [which[worst[where[worst] == k]] for k in range(len(used))])
+
+
+def _at_poses(task: Task, kept: Sequence[IndexArray]) -> Task:
+    """The task at some poses of each operation; one without any is left out."""
+    operations = zip(task.operations, kept, strict=True)
+    return replace(
+        task,
+        operations=tuple(replace(o, poses=o.poses[some]) for o, some in operations if len(some)),
+    )

@@ -158,15 +158,15 @@ def refused_efforts(robot: FlexibleRobot) -> dict[str, str]:
     Returns:
         by joint, those whose strength is picchio's own estimate, or not known.
     """
-    refused = placeholders(robot)
-    return {
-        joint.name: refused[joint.name]
+    asked = [
+        joint.name
         for joint in robot.flexible_joints
-        if joint.name in refused
-        and joint.shaft is None
+        if joint.shaft is None
         and joint.reducer is None
         and is_estimate(robot.origins.get(f"{joint.name}.strength", ESTIMATE))
-    }
+    ]
+    refused = placeholders(robot) if asked else {}
+    return {name: refused[name] for name in asked if name in refused}
 
 
 def rounded(value: float) -> float:
