@@ -87,23 +87,25 @@ def predict(draws: Draws, group: Group, *, given: bool = False) -> tuple[Array, 
     rows, columns = np.nonzero(there)
     data = group.values[rows, columns]
     same, own_row = rows[:, None] == rows, joint[:, None] == rows
-    means, covs = [], []
-    for k in range(len(draws.mean)):
-        a, b = draws.size[k], draws.joint_size[k]
-        between = np.outer(a, a) + np.diag(draws.scatter[k])
-        within = np.outer(b, b) + np.diag(draws.joint_scatter[k])
-        centre = draws.mean[k] + group.place @ draws.contrast[k].T
-        cov = between[np.ix_(columns, columns)] + same * within[np.ix_(columns, columns)]
-        cross = between[np.ix_(asked, columns)] + own_row * within[np.ix_(asked, columns)]
-        gain = np.linalg.solve(cov, cross.T).T
-        means.append(centre[joint, asked] + gain @ (data - centre[rows, columns]))
-        own = between[np.ix_(asked, asked)] + np.eye(n) * within[np.ix_(asked, asked)]
-        covs.append(own - gain @ cross.T)
+
+    def cov(ones: NDArray[np.intp], others: NDArray[np.intp], alike: Array) -> Array:
+        """(d, len(ones), len(others)) of quantities, of one joint where `alike`."""
+        equal = ones[:, None] == others
+        a, b = draws.size, draws.joint_size
+        between = a[:, ones, None] * a[:, None, others] + equal * draws.scatter[:, None, others]
+        within = b[:, ones, None] * b[:, None, others]
+        return between + alike * (within + equal * draws.joint_scatter[:, None, others])
+
+    centre = draws.mean[:, None] + np.einsum("nq,dpq->dnp", group.place, draws.contrast)
+    cross = cov(asked, columns, own_row)
+    gain = np.linalg.solve(cov(columns, columns, same), cross.swapaxes(1, 2)).swapaxes(1, 2)
+    means = centre[:, joint, asked] + np.einsum("dnr,dr->dn", gain, data - centre[:, rows, columns])
+    covs = cov(asked, asked, np.eye(n)) - gain @ cross.swapaxes(1, 2)
     kinds = range(draws.share.shape[1]) if group.kind is None else [group.kind]
     weight = draws.share[:, kinds] / draws.share[:, kinds].sum(axis=1, keepdims=True)
-    moved = np.array(means)[:, None] + draws.shift[:, kinds, None]
+    moved = means[:, None] + draws.shift[:, kinds, None]
     return (
         (weight / len(weight)).ravel(),
         moved.reshape(-1, n),
-        np.repeat(np.array(covs), len(kinds), axis=0),
+        np.repeat(covs, len(kinds), axis=0),
     )

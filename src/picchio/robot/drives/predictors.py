@@ -194,7 +194,9 @@ def _own_weight(robot: FlexibleRobot) -> Array:
     pull = load * np.array(robot.mounting.gravity)
     most = np.zeros(robot.rigid.nv)
     for pose in _drawn_poses(robot):
-        torque = robot.rigid.gravity_torque(pose) + robot.rigid.jacobian(pose, frame)[:3].T @ pull
+        torque = robot.rigid.gravity_torque(pose)
+        if load:
+            torque = torque + robot.rigid.jacobian(pose, frame)[:3].T @ pull
         most = np.maximum(most, np.abs(torque))
     return most
 
