@@ -6,12 +6,13 @@ import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from statistics import NormalDist
 from typing import Any
 
 import numpy as np
 
-from picchio.core.arrays import FloatArray, IndexArray
+from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.core.processes import one_thread
 from picchio.core.recent import Recent
@@ -30,7 +31,8 @@ LEVEL = 0.90
 NO_SHAFT = "no joint has a shaft or a reducer, so no life can be told: give them in the sidecar"
 """Why there is no life where there is none."""
 
-# Poses of each operation and joint where design points are looked for, the most strained ones.
+# Poses of each operation and joint where design points are judged, the most strained ones: another
+# one may be the worst there. Slopes are taken at each joint's worst alone.
 _WORST = 2
 # Poses whose geometry is kept while all values are looked at there.
 _KEPT = 64
@@ -251,7 +253,7 @@ def life_intervals(
     Raises:
         InputError: as `assess`.
     """
-    worst, single = _most_strained(task, found), _most_strained_of_all(task, found)
+    worst, single = _most_strained(task, found)
     z = NormalDist().inv_cdf(0.5 + 0.5 * LEVEL)
     settings = {**options, "steady_check": False, "uncertainty": False}
     bare = Model(robot, geometries=Recent(_KEPT))
@@ -277,52 +279,45 @@ def life_intervals(
     def slope(step: FloatArray) -> FloatArray | None:
         return _slope(unsure, step, lambda vector: at(vector, single), *centre)
 
-    def used(asked: tuple[int, FloatArray]) -> float | None:
-        j, point = asked
-        there = at(point)
-        return None if there is None else found.joints[j].utilisation * there[0][j] / reference[j]
-
-    def life(asked: tuple[int, FloatArray]) -> float | None:
-        j, point = asked
+    def reached(asked: tuple[FloatArray, bool]) -> tuple[FloatArray, FloatArray] | None:
+        """Share of the utilisation told, and damage, at a design point."""
+        point, lives = asked
         there = at(point)
         # The most strained pose is the first to be damaged: no damage there, none at all.
-        if there is not None and there[1][j] > 0.0:
-            there = at(point, task)
-        if there is None:
-            return None
-        damage = there[1][j] / task.rivets_per_pass
-        return 1.0 / damage if damage > 0.0 else math.inf
+        if lives and there is not None and there[1].any():
+            whole = at(point, task)
+            there = None if whole is None else (there[0], whole[1])
+        return None if there is None else (there[0] / reference, there[1])
 
-    functions: dict[str, Callable[[Any], Any]] = {"slope": slope, "used": used, "life": life}
+    functions: dict[str, Callable[[Any], Any]] = {"slope": slope, "reached": reached}
     told: dict[str, dict[str, tuple[float, float]]] = {}
     with one_thread(), worker_pool(workers, trials(functions)) as mapped:
         slopes = _of_both(mapped("slope", spread.T), len(found.joints))
         points = [
-            [
-                (j, point)
-                for j, joint in enumerate(found.joints)
-                if joint.sn_curve
-                for point in _design_points(unsure.centre, spread, own[:, j], z)
-            ]
-            for own in slopes
+            [_design_points(unsure.centre, spread, own[:, j], z) for own in slopes]
+            for j, joint in enumerate(found.joints)
+            if joint.sn_curve
         ]
-        # Where there is no model, nothing holds.
-        reached = [
-            [least if value is None else float(value) for value in mapped(name, own)]
-            for name, least, own in zip(("used", "life"), (math.inf, 0.0), points, strict=True)
-        ]
-    for k, joint in enumerate(found.joints):
-        if joint.sn_curve:
-            used_there, lives_there = (
-                [value for (j, _), value in zip(own, values, strict=True) if j == k]
-                for own, values in zip(points, reached, strict=True)
-            )
-            used_there.append(joint.utilisation)
-            lives_there.append(joint.rivets_to_failure)
-            told[joint.name] = {
-                "rivets_interval": (min(lives_there), max(lives_there)),
-                "utilisation_interval": (min(used_there), max(used_there)),
-            }
+        # Where nothing is damaged both look at the same points.
+        asked = {
+            point.tobytes(): (point, lives)
+            for lives in (False, True) for both in points for point in both[lives]
+        }  # fmt: skip
+        strains = dict(zip(asked, mapped("reached", list(asked.values())), strict=True))
+    nothing = np.full((2, len(found.joints)), math.inf)  # where there is no model, nothing holds
+    judged = ((k, joint) for k, joint in enumerate(found.joints) if joint.sn_curve)
+    for (k, joint), both in zip(judged, points, strict=True):
+        used, spent = (
+            [float((strains[point.tobytes()] or nothing)[i][k]) for point in own]
+            for i, own in enumerate(both)
+        )
+        lives = [task.rivets_per_pass / each if each > 0.0 else math.inf for each in spent]
+        told[joint.name] = {
+            "rivets_interval": _ends([*lives, joint.rivets_to_failure]),
+            "utilisation_interval": _ends(
+                [*(joint.utilisation * each for each in used), joint.utilisation]
+            ),
+        }
     return told
 
 
@@ -373,25 +368,24 @@ def _strain(found: Assessment) -> tuple[FloatArray, FloatArray]:
     return used, spent
 
 
-def _most_strained(task: Task, found: Assessment) -> Task:
-    """The task with every operation's and joint's most strained poses alone."""
-    ranked = [np.argsort(np.nan_to_num(r.utilisation), axis=0) for r in found.operations]
-    return _at_poses(task, [np.unique(order[-_WORST:]) for order in ranked])
+def _ends(values: Sequence[float]) -> tuple[float, float]:
+    return min(values), max(values)
 
 
-def _most_strained_of_all(task: Task, found: Assessment) -> Task:
-    """The task with every joint's most strained pose alone, where slopes are taken."""
+def _most_strained(task: Task, found: Assessment) -> tuple[Task, Task]:
+    """The task at every operation's and joint's most strained poses, and at every joint's alone."""
     used = [np.nan_to_num(result.utilisation) for result in found.operations]
-    where = np.concatenate([np.full(len(each), k) for k, each in enumerate(used)])
-    which = np.concatenate([np.arange(len(each)) for each in used])
-    worst = np.unique(np.argmax(np.concatenate(used), axis=0))
-    return _at_poses(task, [which[worst[where[worst] == k]] for k in range(len(used))])
-
-
-def _at_poses(task: Task, kept: Sequence[IndexArray]) -> Task:
-    """The task at some poses of each operation; one without any is left out."""
-    operations = zip(task.operations, kept, strict=True)
-    return replace(
-        task,
-        operations=tuple(replace(o, poses=o.poses[some]) for o, some in operations if len(some)),
+    some = [np.unique(np.argsort(each, axis=0)[-_WORST:]) for each in used]
+    first = np.cumsum([0, *map(len, used)])
+    top = np.unique(np.argmax(np.concatenate(used), axis=0))
+    one = [top[(top >= low) & (top < high)] - low for low, high in pairwise(first)]
+    chosen = (
+        tuple(
+            replace(operation, poses=operation.poses[own])
+            for operation, own in zip(task.operations, kept, strict=True)
+            if own.size
+        )
+        for kept in (some, one)
     )
+    worst, single = (replace(task, operations=operations) for operations in chosen)
+    return worst, single
