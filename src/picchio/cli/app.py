@@ -8,8 +8,9 @@ import re
 import textwrap
 import tomllib
 from collections.abc import Callable
+from copy import copy
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, get_origin
 
 import typer
 from typer.core import TyperCommand
@@ -85,9 +86,35 @@ _VERBOSE = Annotated[
 ]  # fmt: skip
 
 
+_ENTRY = re.compile(r"^    (\w+)(?: \(([^)]*)\))?: ", re.MULTILINE)
+
+
+def _described(function: Callable[..., Any]) -> tuple[str, dict[str, tuple[str | None, str]]]:
+    """What a command does; {parameter: (what stands for its value, help)}, from its docstring."""
+    doc, _, listed = (inspect.getdoc(function) or "").partition("\n\nOptions:\n")
+    _, *parts = _ENTRY.split(listed)
+    entries = zip(parts[::3], parts[1::3], parts[2::3], strict=True)
+    return doc, {name: (metavar, " ".join(text.split())) for name, metavar, text in entries}
+
+
+def _declared(
+    given: inspect.Parameter, metavar: str | None = None, text: str | None = None
+) -> inspect.Parameter:
+    """A parameter as Typer takes it: an argument, or, after the `*`, an option."""
+    kind, flag = given.annotation, "--" + given.name.replace("_", "-")
+    if get_origin(kind) is Annotated:
+        kind, made = kind.__origin__, copy(kind.__metadata__[0])
+    elif given.kind is not given.KEYWORD_ONLY:
+        made = typer.Argument()
+    else:  # a flag has no opposite unless it is set at first
+        made = typer.Option(*[flag] * (kind is bool and not given.default))
+    made.metavar, made.help = made.metavar or metavar, made.help or text
+    return given.replace(annotation=Annotated[kind, made])
+
+
 class _App(typer.Typer):
     def command(self, name: str | None = None, **options: Any) -> Any:
-        """Every command takes `-v`."""
+        """Every command takes `-v`; its docstring says what its other options are."""
         register = super().command(name, **{"cls": _Command} | options)
 
         def added(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -97,11 +124,14 @@ class _App(typer.Typer):
                 return function(**given)
 
             own = inspect.signature(function, eval_str=True)
-            more = inspect.Parameter("verbose", inspect.Parameter.KEYWORD_ONLY, default=False,
-                                     annotation=_VERBOSE)  # fmt: skip
-            every = {**own.parameters, "verbose": more}
-            told.__annotations__ = {name: p.annotation for name, p in every.items()}
-            vars(told)["__signature__"] = own.replace(parameters=list(every.values()))
+            told.__doc__, listed = _described(function)
+            every = [
+                _declared(each, *listed.get(each.name, ())) for each in own.parameters.values()
+            ]
+            every.append(inspect.Parameter("verbose", inspect.Parameter.KEYWORD_ONLY, default=False,
+                                           annotation=_VERBOSE))  # fmt: skip
+            told.__annotations__ = {each.name: each.annotation for each in every}
+            vars(told)["__signature__"] = own.replace(parameters=every)
             register(told)
             return function
 

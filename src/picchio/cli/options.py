@@ -16,14 +16,16 @@ from picchio.cli.output import folder_to_write, to_write
 from picchio.core.errors import InputError
 
 
-def output(key: str, metavar: str, help: str, *endings: str, **how: bool) -> Any:
+def output(
+    key: str, *endings: str, metavar: str | None = None, help: str | None = None, **how: bool
+) -> Any:
     """An option that names a file to write; it is refused before any work where it cannot be.
 
     Args:
         key: such as "--out".
-        metavar: of its value.
-        help: of the option.
         *endings: of the file's name, where they are not all right.
+        metavar: of its value, as the command's docstring says if not given here.
+        help: likewise.
         **how: see `picchio.core.guard.Guard.declare`.
     """
 
@@ -33,19 +35,17 @@ def output(key: str, metavar: str, help: str, *endings: str, **how: bool) -> Any
     return typer.Option(key, metavar=metavar, help=help, parser=named, rich_help_panel=OUTPUT)
 
 
-def folder(key: str, metavar: str, help: str) -> Any:
+def folder(key: str) -> Any:
     """An option that names the folder of a campaign to write.
 
     Args:
         key: such as "--to".
-        metavar: of its value.
-        help: of the option.
     """
 
     def named(text: str) -> Path:
         return folder_to_write(text, key)
 
-    return typer.Option(key, metavar=metavar, help=help, parser=named, rich_help_panel=OUTPUT)
+    return typer.Option(key, parser=named, rich_help_panel=OUTPUT)
 
 
 def _json(text: str) -> str:
@@ -178,7 +178,8 @@ DataOption = Annotated[
     Path, typer.Option(metavar="CAMPAIGN", help="Measured data: a folder with a campaign.toml.")
 ]
 ReportOption = Annotated[
-    Path | None, output("--report", "OUT.html", "Write one HTML page to read and print.", *PAGES)
+    Path | None,
+    output("--report", *PAGES, metavar="OUT.html", help="Write one HTML page to read and print."),
 ]
 JsonOption = Annotated[
     str | None,
@@ -252,6 +253,3 @@ def _is_number(text: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-POSE_HELP = "Joint positions, rad or m: Q1,Q2,..., or NAME=VALUE,... (the rest at zero), or a name."

@@ -56,6 +56,7 @@ if TYPE_CHECKING:
 @app.command()
 def assess(
     robot: RobotArgument,
+    *,
     task: TaskOption = None,
     flex: FlexOption = None,
     tool: ToolOption = None,
@@ -66,108 +67,56 @@ def assess(
     force: ForceOption = None,
     period: PeriodOption = None,
     width: WidthOption = None,
-    hits: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="Blows of a rivet; likewise.")
-    ] = None,
-    method: Annotated[
-        str,
-        typer.Option(
-            metavar="METHOD",
-            help="rainflow: each rivet from rest, its cycles counted; paper: steady state, one "
-            "cycle a hit (Nie et al. 2016).",
-        ),
-    ] = "rainflow",
+    hits: Annotated[int | None, typer.Option(min=1)] = None,
+    method: str = "rainflow",
     sn_curve: SNCurveOption = None,
-    residue: Annotated[
-        str,
-        typer.Option(
-            metavar="RULE",
-            help="What rainflow does with cycles that do not close: half-cycles, repeated or "
-            "discarded.",
-        ),
-    ] = "half-cycles",
-    mean_stress: Annotated[
-        str,
-        typer.Option(
-            metavar="RULE",
-            help="Mean stress correction: none, goodman, gerber, soderberg, morrow, walker, swt or "
-            "fkm.",
-        ),
-    ] = "none",
-    paper_mean_stress: Annotated[
-        bool,
-        typer.Option(
-            "--paper-mean-stress",
-            help="With --method paper: the life at the mean of the poses' stresses (its Table 2).",
-        ),
-    ] = False,
-    for_life: Annotated[
-        float | None,
-        typer.Option(
-            metavar="N",
-            help="Yes or no: does it survive N rivets? And the force, hits, shafts and reducers "
-            "that this life allows.",
-        ),
-    ] = None,
-    survival: Annotated[
-        float | None,
-        typer.Option(metavar="P", help="Probability of survival for --for-life, such as 0.99."),
-    ] = None,
-    uncertainty: Annotated[
-        bool,
-        typer.Option(
-            "--uncertainty", help="The life's P10, P50 and P90, and what they depend on; a minute."
-        ),
-    ] = False,
-    spread: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--spread",
-            metavar="NAME=FACTOR",
-            help="How uncertain a value is, for --uncertainty: stiffness, damping_ratio, force, "
-            "width, model, or one value such as stiffness.joint_2. Repeat it for more.",
-        ),
-    ] = None,
-    seed: Annotated[
-        int | None,
-        typer.Option(metavar="N", min=0, help="Random seed for --uncertainty; 0 if not given."),
-    ] = None,
-    compare_methods: Annotated[
-        bool,
-        typer.Option(
-            "--compare-methods", help="From the paper's method to this one, step by step."
-        ),
-    ] = False,
+    residue: str = "half-cycles",
+    mean_stress: str = "none",
+    paper_mean_stress: bool = False,
+    for_life: float | None = None,
+    survival: float | None = None,
+    uncertainty: bool = False,
+    spread: list[str] | None = None,
+    seed: Annotated[int | None, typer.Option(min=0)] = None,
+    compare_methods: bool = False,
     gravity_stiffness: GravityStiffnessOption = None,
-    gravity_balanced: Annotated[
-        bool,
-        typer.Option("--gravity-balanced", help="The arm is balanced: no gravity in its joints."),
-    ] = False,
-    strict: Annotated[
-        bool,
-        typer.Option(
-            "--strict",
-            help="Exit with 3 unless the verdict is safe, by drives that are not picchio's own "
-            "estimate, or, with --for-life, the answer is yes.",
-        ),
-    ] = False,
+    gravity_balanced: bool = False,
+    strict: bool = False,
     report: ReportOption = None,
-    title: Annotated[
-        str | None, typer.Option(metavar="TEXT", help="With --report: the page's title.")
-    ] = None,
-    customer: Annotated[
-        str | None, typer.Option(metavar="TEXT", help="With --report: who it is for.")
-    ] = None,
-    author: Annotated[
-        str | None, typer.Option(metavar="TEXT", help="With --report: who it is from.")
-    ] = None,
-    logo: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="With --report: a picture, PNG, JPEG or SVG; 1 MB."),
-    ] = None,
+    title: str | None = None,
+    customer: str | None = None,
+    author: str | None = None,
+    logo: Path | None = None,
     json: JsonOption = None,
 ) -> None:
-    """How many rivets each joint of a robot survives on a task."""
+    """How many rivets each joint of a robot survives on a task.
+
+    Options:
+        hits (N): Blows of a rivet; likewise.
+        method (METHOD): rainflow: each rivet from rest, its cycles counted; paper: steady state,
+            one cycle a hit (Nie et al. 2016).
+        residue (RULE): What rainflow does with cycles that do not close: half-cycles, repeated or
+            discarded.
+        mean_stress (RULE): Mean stress correction: none, goodman, gerber, soderberg, morrow,
+            walker, swt or fkm.
+        paper_mean_stress: With --method paper: the life at the mean of the poses' stresses (its
+            Table 2).
+        for_life (N): Yes or no: does it survive N rivets? And the force, hits, shafts and reducers
+            that this life allows.
+        survival (P): Probability of survival for --for-life, such as 0.99.
+        uncertainty: The life's P10, P50 and P90, and what they depend on; a minute.
+        spread (NAME=FACTOR): How uncertain a value is, for --uncertainty: stiffness, damping_ratio,
+            force, width, model, or one value such as stiffness.joint_2. Repeat it for more.
+        seed (N): Random seed for --uncertainty; 0 if not given.
+        compare_methods: From the paper's method to this one, step by step.
+        gravity_balanced: The arm is balanced: no gravity in its joints.
+        strict: Exit with 3 unless the verdict is safe, by drives that are not picchio's own
+            estimate, or, with --for-life, the answer is yes.
+        title (TEXT): With --report: the page's title.
+        customer (TEXT): With --report: who it is for.
+        author (TEXT): With --report: who it is from.
+        logo (FILE): With --report: a picture, PNG, JPEG or SVG; 1 MB.
+    """
     import picchio
     from picchio.studies.assessment.method_comparison import method_terms
     from picchio.studies.default_task import task_of

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from picchio.cli.app import app
 from picchio.cli.options import FlexOption, JsonOption, ReportOption, TaskOption, ToolOption
@@ -27,19 +25,10 @@ if TYPE_CHECKING:
 
 @app.command()
 def compare(
-    items: Annotated[
-        list[str],
-        typer.Argument(
-            metavar="A B ...",
-            help="Robots, saved models, tasks, sidecars (a gun is in one), or JSON files that "
-            "commands wrote.",
-        ),
-    ],
+    items: list[str],
+    *,
     task: TaskOption = None,
-    robot: Annotated[
-        str | None,
-        typer.Option(metavar="ROBOT", help="The robot that tasks and sidecars are compared on."),
-    ] = None,
+    robot: str | None = None,
     flex: FlexOption = None,
     tool: ToolOption = None,
     report: ReportOption = None,
@@ -48,6 +37,11 @@ def compare(
     """What differs between robots, tasks or results.
 
     Robots, models, tasks and sidecars are assessed first; saved results are compared as they are.
+
+    Options:
+        items (A B ...): Robots, saved models, tasks, sidecars (a gun is in one), or JSON files that
+            commands wrote.
+        robot (ROBOT): The robot that tasks and sidecars are compared on.
     """
     import picchio
 

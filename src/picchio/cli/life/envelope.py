@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import numpy as np
-import typer
 
 from picchio.cli.app import app
 from picchio.cli.options import (
-    POSE_HELP,
     FlexOption,
     ForceOption,
     GravityStiffnessOption,
@@ -33,12 +31,8 @@ if TYPE_CHECKING:
 @app.command()
 def envelope(
     robot: RobotArgument,
-    pose: Annotated[
-        str | None,
-        typer.Option(
-            metavar="Q1,Q2,...", help=f"{POSE_HELP} The first of the robot's task if not given."
-        ),
-    ] = None,
+    *,
+    pose: str | None = None,
     force: ForceOption = None,
     period: PeriodOption = None,
     width: WidthOption = None,
@@ -52,6 +46,10 @@ def envelope(
     """The worst force direction of every joint at a pose.
 
     It is exact: no direction is sampled.
+
+    Options:
+        pose (Q1,Q2,...): Joint positions, rad or m: Q1,Q2,..., or NAME=VALUE,... (the rest at
+            zero), or a name. The first of the robot's task if not given.
     """
     import picchio
     from picchio.robot.dynamics.pose import warn_beyond_limits

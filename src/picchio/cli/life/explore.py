@@ -25,24 +25,11 @@ from picchio.cli.output import deliver, telling
 @app.command()
 def explore(
     robot: RobotArgument,
+    *,
     task: TaskOption = None,
-    model: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="An extended model, of `picchio diagnose --model`, to stand beside the nominal.",
-        ),
-    ] = None,
-    save: Annotated[
-        Path | None,
-        output(
-            "--save",
-            "FILE",
-            "The task that a click puts the pose into; ROBOT-explored.toml if not given.",
-            added_to=True,
-        ),
-    ] = None,
-    browser: Annotated[bool, typer.Option("--open", help="Open the page in the browser.")] = False,
+    model: Path | None = None,
+    save: Annotated[Path | None, output("--save", added_to=True)] = None,
+    browser: Annotated[bool, typer.Option("--open")] = False,
     flex: FlexOption = None,
     tool: ToolOption = None,
     reducers: ReducersOption = None,
@@ -52,6 +39,11 @@ def explore(
 
     A page on this machine alone; its address is printed. Ctrl-C ends it. With --json what was on
     the screen last is written then.
+
+    Options:
+        model (FILE): An extended model, of `picchio diagnose --model`, to stand beside the nominal.
+        save (FILE): The task that a click puts the pose into; ROBOT-explored.toml if not given.
+        browser: Open the page in the browser.
     """
     import picchio
 

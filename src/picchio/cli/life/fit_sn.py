@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from picchio.cli.app import app
 from picchio.cli.options import PICTURES, JsonOption, output
 from picchio.cli.output import console, deliver, styled, table, telling
@@ -17,69 +15,41 @@ if TYPE_CHECKING:
 
 @app.command()
 def fit_sn(
-    tests: Annotated[
-        Path,
-        typer.Argument(
-            metavar="TESTS.csv",
-            help="A row a specimen: `Stress amplitude [MPa]` (or range, max and R), `Cycles`, "
-            "`Failure` (yes or no) or `Outcome` (Failure or RunOut).",
-        ),
-    ],
-    survival: Annotated[
-        float, typer.Option(metavar="P", help="Probability of survival of the design curve.")
-    ] = 0.975,
-    level: Annotated[
-        float, typer.Option(metavar="P", help="Level of the two-sided confidence intervals.")
-    ] = 0.90,
-    kind: Annotated[
-        str,
-        typer.Option(
-            metavar="KIND", help="The stress of the tests: shear, or normal (bending, axial)."
-        ),
-    ] = "shear",
-    run_out_cycles: Annotated[
-        float | None,
-        typer.Option(
-            metavar="N", help="Without an outcome column: specimens that reached N are run-outs."
-        ),
-    ] = None,
-    stress: Annotated[
-        str | None,
-        typer.Option(
-            metavar="KIND", help="What the column of stresses holds: amplitude, range or max."
-        ),
-    ] = None,
-    stress_column: Annotated[
-        str | None, typer.Option(metavar="COLUMN", help="The column of stresses, by its name.")
-    ] = None,
-    stress_unit: Annotated[
-        str | None,
-        typer.Option(metavar="UNIT", help="Of the stresses, where their name has none: MPa, ksi."),
-    ] = None,
-    ratio: Annotated[
-        float | None,
-        typer.Option(metavar="R", help="Least over largest stress, where no column says."),
-    ] = None,
-    cycles: Annotated[
-        str | None, typer.Option(metavar="COLUMN", help="The column of cycles, by its name.")
-    ] = None,
-    outcome: Annotated[
-        str | None,
-        typer.Option(metavar="COLUMN", help="The column that says which specimens failed."),
-    ] = None,
-    out: Annotated[
-        Path | None,
-        output("--out", "FILE", "Write the design curve (TOML) for --sn-curve."),
-    ] = None,
-    plot: Annotated[
-        Path | None,
-        output("--plot", "FILE", "Draw tests and curve: .png, .svg or .pdf.", *PICTURES),
-    ] = None,
+    tests: Path,
+    *,
+    survival: float = 0.975,
+    level: float = 0.9,
+    kind: str = "shear",
+    run_out_cycles: float | None = None,
+    stress: str | None = None,
+    stress_column: str | None = None,
+    stress_unit: str | None = None,
+    ratio: float | None = None,
+    cycles: str | None = None,
+    outcome: str | None = None,
+    out: Annotated[Path | None, output("--out")] = None,
+    plot: Annotated[Path | None, output("--plot", *PICTURES)] = None,
     json: JsonOption = None,
 ) -> None:
     """Fit an S-N curve to test data, run-outs included.
 
     Slope, knee, endurance limit and scatter, each with its confidence interval.
+
+    Options:
+        tests (TESTS.csv): A row a specimen: `Stress amplitude [MPa]` (or range, max and R),
+            `Cycles`, `Failure` (yes or no) or `Outcome` (Failure or RunOut).
+        survival (P): Probability of survival of the design curve.
+        level (P): Level of the two-sided confidence intervals.
+        kind (KIND): The stress of the tests: shear, or normal (bending, axial).
+        run_out_cycles (N): Without an outcome column: specimens that reached N are run-outs.
+        stress (KIND): What the column of stresses holds: amplitude, range or max.
+        stress_column (COLUMN): The column of stresses, by its name.
+        stress_unit (UNIT): Of the stresses, where their name has none: MPa, ksi.
+        ratio (R): Least over largest stress, where no column says.
+        cycles (COLUMN): The column of cycles, by its name.
+        outcome (COLUMN): The column that says which specimens failed.
+        out (FILE): Write the design curve (TOML) for --sn-curve.
+        plot (FILE): Draw tests and curve: .png, .svg or .pdf.
     """
     import picchio
 

@@ -46,110 +46,60 @@ if TYPE_CHECKING:
 @app.command("map")
 def map_(
     robot: RobotArgument,
-    out: Annotated[
-        Path | None,
-        output("--out", "FILE", "map.nc (netCDF) or map.zarr (Zarr); ROBOT-map.nc if not given."),
-    ] = None,
-    plane: Annotated[
-        str | None,
-        typer.Option(metavar="PLANE", help="Points on a plane: xy, xz or yz; the default is xz."),
-    ] = None,
-    at: Annotated[
-        float, typer.Option(metavar="M", help="Where the plane cuts the third axis, m.")
-    ] = 0.0,
-    box: Annotated[bool, typer.Option("--box", help="Points in a box.")] = False,
-    points: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="CSV",
-            help="Points from columns x [m], y [m], z [m], with normals from nx, ny, nz if there.",
-        ),
-    ] = None,
-    surface: Annotated[
-        Path | None,
-        typer.Option(metavar="MESH", help="Points on a mesh (STL, OBJ, PLY, ...; m, world)."),
-    ] = None,
-    joint_grid: Annotated[
-        str | None, typer.Option(metavar="N[,N...]", help="Poses on a grid of N positions a joint.")
-    ] = None,
-    spacing: Annotated[
-        float | None,
-        typer.Option(metavar="M", help="Distance of points on a plane, in a box or on a mesh, m."),
-    ] = None,
-    bounds: Annotated[
-        str | None,
-        typer.Option(
-            metavar="LOW,HIGH,...", help="Ends along each axis, m; all within reach if not given."
-        ),
-    ] = None,
-    direction: Annotated[
-        str | None,
-        typer.Option(
-            metavar="X,Y,Z",
-            help="Direction of the force; or `worst` (each joint's own), the default; or `normal` "
-            "(to the surface), the default with --surface.",
-        ),
-    ] = None,
-    branch: Annotated[
-        str,
-        typer.Option(
-            metavar="WORD",
-            help="Branches of the inverse kinematics: all, any (one), elbow-up, elbow-down, or "
-            "signs of joints such as joint_3+.",
-        ),
-    ] = "all",
+    *,
+    out: Annotated[Path | None, output("--out")] = None,
+    plane: str | None = None,
+    at: float = 0.0,
+    box: bool = False,
+    points: Path | None = None,
+    surface: Path | None = None,
+    joint_grid: str | None = None,
+    spacing: float | None = None,
+    bounds: str | None = None,
+    direction: str | None = None,
+    branch: str = "all",
     hits: HitsOption = None,
-    damage: Annotated[
-        bool,
-        typer.Option(
-            "--damage", help="Count the damage of a rivet, too: --hits blows, or the task's."
-        ),
-    ] = False,
+    damage: bool = False,
     force: ForceOption = None,
     period: PeriodOption = None,
     width: WidthOption = None,
     flex: FlexOption = None,
     tool: ToolOption = None,
     reducers: ReducersOption = None,
-    chunk: Annotated[
-        int | None,
-        typer.Option(
-            metavar="N",
-            min=1,
-            help="Places computed and kept at a time; if not given, 64 to 16384 by what one takes.",
-        ),
-    ] = None,
-    restart: Annotated[
-        bool,
-        typer.Option("--restart", help="Start afresh, though an interrupted map could be resumed."),
-    ] = False,
-    workers: Annotated[
-        int | None,
-        typer.Option(
-            metavar="N",
-            min=0,
-            help="Worker processes; 0 or 1: none. By default one a core for large maps.",
-        ),
-    ] = None,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(metavar="ADDRESS", help="A dask scheduler, instead of own processes."),
-    ] = None,
-    plot: Annotated[
-        Path | None,
-        output(
-            "--plot", "FILE", "Draw it, a joint below the other: .png, .svg or .pdf.", *PICTURES
-        ),
-    ] = None,
-    html: Annotated[
-        Path | None,
-        output("--html", "FILE", "The map in 3-D, to turn and to cut, as one HTML file.", *PAGES),
-    ] = None,
+    chunk: Annotated[int | None, typer.Option(min=1)] = None,
+    restart: bool = False,
+    workers: Annotated[int | None, typer.Option(min=0)] = None,
+    scheduler: str | None = None,
+    plot: Annotated[Path | None, output("--plot", *PICTURES)] = None,
+    html: Annotated[Path | None, output("--html", *PAGES)] = None,
     json: JsonOption = None,
 ) -> None:
     """Peaks, worst directions and frequencies over the workspace.
 
     A map that was interrupted resumes when the same command is given again.
+
+    Options:
+        out (FILE): map.nc (netCDF) or map.zarr (Zarr); ROBOT-map.nc if not given.
+        plane (PLANE): Points on a plane: xy, xz or yz; the default is xz.
+        at (M): Where the plane cuts the third axis, m.
+        box: Points in a box.
+        points (CSV): Points from columns x [m], y [m], z [m], with normals from nx, ny, nz if
+            there.
+        surface (MESH): Points on a mesh (STL, OBJ, PLY, ...; m, world).
+        joint_grid (N[,N...]): Poses on a grid of N positions a joint.
+        spacing (M): Distance of points on a plane, in a box or on a mesh, m.
+        bounds (LOW,HIGH,...): Ends along each axis, m; all within reach if not given.
+        direction (X,Y,Z): Direction of the force; or `worst` (each joint's own), the default; or
+            `normal` (to the surface), the default with --surface.
+        branch (WORD): Branches of the inverse kinematics: all, any (one), elbow-up, elbow-down, or
+            signs of joints such as joint_3+.
+        damage: Count the damage of a rivet, too: --hits blows, or the task's.
+        chunk (N): Places computed and kept at a time; if not given, 64 to 16384 by what one takes.
+        restart: Start afresh, though an interrupted map could be resumed.
+        workers (N): Worker processes; 0 or 1: none. By default one a core for large maps.
+        scheduler (ADDRESS): A dask scheduler, instead of own processes.
+        plot (FILE): Draw it, a joint below the other: .png, .svg or .pdf.
+        html (FILE): The map in 3-D, to turn and to cut, as one HTML file.
     """
     import picchio
     from picchio.studies.tasks import blows_of, hits_of_rivet

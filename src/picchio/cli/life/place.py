@@ -38,58 +38,37 @@ if TYPE_CHECKING:
 @app.command()
 def place(
     robot: RobotArgument,
+    *,
     task: TaskOption = None,
-    move: Annotated[
-        str | None,
-        typer.Option(
-            metavar="X,Y,Z,HEADING",
-            help="How far the work may go each way, m, m, m and deg; 0 for not at all. Half the "
-            "arm's reach and 180 if not given.",
-        ),
-    ] = None,
-    period_range: Annotated[
-        str | None,
-        typer.Option(
-            metavar="LOW,HIGH",
-            help="Periods that the tool can be set to, s; the task's own if not given.",
-        ),
-    ] = None,
-    margin: Annotated[
-        float,
-        typer.Option(
-            metavar="M", help="Every rivet stays in reach when the work stands so far aside, m."
-        ),
-    ] = 0.0,
-    off: Annotated[
-        float,
-        typer.Option(metavar="M", help="Tell what it costs to miss the best place by so much, m."),
-    ] = 0.05,
-    placements: Annotated[
-        int,
-        typer.Option(
-            metavar="N", help="Placements within reach to try all over, before searching locally."
-        ),
-    ] = 400,
+    move: str | None = None,
+    period_range: str | None = None,
+    margin: float = 0.0,
+    off: float = 0.05,
+    placements: int = 400,
     flex: FlexOption = None,
     tool: ToolOption = None,
     reducers: ReducersOption = None,
     sn_curve: SNCurveOption = None,
-    self_collision: Annotated[
-        bool,
-        typer.Option(
-            "--self-collision/--no-self-collision",
-            help="Whether poses whose links touch are refused.",
-        ),
-    ] = True,
-    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Random seed of the search.")] = 0,
-    out: Annotated[
-        Path | None, output("--out", "FILE", "Write the task with the work moved (TOML).")
-    ] = None,
+    self_collision: Annotated[bool, typer.Option("--self-collision/--no-self-collision")] = True,
+    seed: Annotated[int, typer.Option(min=0)] = 0,
+    out: Annotated[Path | None, output("--out")] = None,
     json: JsonOption = None,
 ) -> None:
     """Where to put the work so that the robot lasts longest.
 
     The poses are chosen with the place, and the hit rate where a range of periods is given.
+
+    Options:
+        move (X,Y,Z,HEADING): How far the work may go each way, m, m, m and deg; 0 for not at all.
+            Half the arm's reach and 180 if not given.
+        period_range (LOW,HIGH): Periods that the tool can be set to, s; the task's own if not
+            given.
+        margin (M): Every rivet stays in reach when the work stands so far aside, m.
+        off (M): Tell what it costs to miss the best place by so much, m.
+        placements (N): Placements within reach to try all over, before searching locally.
+        self_collision: Whether poses whose links touch are refused.
+        seed (N): Random seed of the search.
+        out (FILE): Write the task with the work moved (TOML).
     """
     import picchio
     from picchio.studies.default_task import task_of

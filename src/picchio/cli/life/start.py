@@ -21,34 +21,29 @@ _NAMED = 6  # rigid joints of one reason
 
 @app.command()
 def start(
-    robot: Annotated[
-        str, typer.Argument(metavar="ROBOT", help="A URDF, or a name from `picchio robots`.")
-    ],
+    robot: str,
+    *,
     tool: ToolOption = None,
     payload: PayloadOption = None,
     reach: ReachOption = None,
     drive_class: ClassOption = None,
-    reducers: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--reducer",
-            metavar="JOINT=NAME",
-            help="A joint's reducer, by its catalogue name; may be repeated.",
-        ),
-    ] = None,
-    seed: Annotated[
-        int, typer.Option(metavar="N", min=0, help="Random seed of the task's poses.")
-    ] = 0,
-    out: Annotated[
-        Path, typer.Option(metavar="FOLDER", help="Where the two files go; it must exist.")
-    ] = Path(),
-    force: Annotated[bool, typer.Option("--force", help="Write over files that exist.")] = False,
+    reducers: Annotated[list[str] | None, typer.Option("--reducer")] = None,
+    seed: Annotated[int, typer.Option(min=0)] = 0,
+    out: Path = Path(),
+    force: bool = False,
     json: JsonOption = None,
 ) -> None:
     """Write estimates of a robot's drives and a first task to edit.
 
     Stiffness, damping and strength of the drives come from the URDF's masses, levers and limits,
     each with its spread and its reason.
+
+    Options:
+        robot (ROBOT): A URDF, or a name from `picchio robots`.
+        reducers (JOINT=NAME): A joint's reducer, by its catalogue name; may be repeated.
+        seed (N): Random seed of the task's poses.
+        out (FOLDER): Where the two files go; it must exist.
+        force: Write over files that exist.
     """
     import picchio
 

@@ -11,7 +11,6 @@ from picchio.cli.app import app
 from picchio.cli.ending import ending
 from picchio.cli.options import (
     PAGES,
-    POSE_HELP,
     FlexOption,
     ForceOption,
     GravityStiffnessOption,
@@ -37,55 +36,19 @@ if TYPE_CHECKING:
 @app.command()
 def view(
     robot: RobotArgument,
-    out: Annotated[
-        Path | None,
-        output("--out", "FILE", "Where the HTML goes; ROBOT-scene.html if not given.", *PAGES),
-    ] = None,
-    rerun: Annotated[
-        Path | None,
-        output(
-            "--rerun",
-            "FILE",
-            "Write the vibration as a Rerun recording (.rrd); needs picchio[rerun].",
-            ".rrd",
-        ),
-    ] = None,
-    live: Annotated[
-        bool, typer.Option("--live", help="Show it in a live meshcat viewer until Ctrl-C.")
-    ] = False,
+    *,
+    out: Annotated[Path | None, output("--out", *PAGES)] = None,
+    rerun: Annotated[Path | None, output("--rerun", ".rrd")] = None,
+    live: bool = False,
     task: TaskOption = None,
-    pose: Annotated[
-        str | None,
-        typer.Option(
-            metavar="Q1,Q2,...",
-            help=f"{POSE_HELP} The task's worst rivet if not given.",
-        ),
-    ] = None,
-    hits: Annotated[
-        int | None,
-        typer.Option(help="With --pose: blows of a burst from rest; steady state if not given."),
-    ] = None,
+    pose: str | None = None,
+    hits: int | None = None,
     force: ForceOption = None,
     period: PeriodOption = None,
     width: WidthOption = None,
-    map_: Annotated[
-        Path | None,
-        typer.Option("--map", metavar="FILE", help="Show a workspace map, of `picchio map`."),
-    ] = None,
-    diagnosis: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", help="Show the causes found, from the JSON of `picchio diagnose`."
-        ),
-    ] = None,
-    joint: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME",
-            help="The joint whose envelope is shown first.",
-            autocompletion=joint_names,
-        ),
-    ] = None,
+    map_: Annotated[Path | None, typer.Option("--map")] = None,
+    diagnosis: Path | None = None,
+    joint: Annotated[str | None, typer.Option(autocompletion=joint_names)] = None,
     flex: FlexOption = None,
     tool: ToolOption = None,
     reducers: ReducersOption = None,
@@ -95,6 +58,17 @@ def view(
     """The robot in 3-D as HTML: envelopes, rivets and vibration.
 
     The file needs no network. Without --pose the task is assessed and shown at its worst rivet.
+
+    Options:
+        out (FILE): Where the HTML goes; ROBOT-scene.html if not given.
+        rerun (FILE): Write the vibration as a Rerun recording (.rrd); needs picchio[rerun].
+        live: Show it in a live meshcat viewer until Ctrl-C.
+        pose (Q1,Q2,...): Joint positions, rad or m: Q1,Q2,..., or NAME=VALUE,... (the rest at
+            zero), or a name. The task's worst rivet if not given.
+        hits: With --pose: blows of a burst from rest; steady state if not given.
+        map_ (FILE): Show a workspace map, of `picchio map`.
+        diagnosis (FILE): Show the causes found, from the JSON of `picchio diagnose`.
+        joint (NAME): The joint whose envelope is shown first.
     """
     import picchio
     from picchio.studies.tasks import blows_of

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import numpy as np
-import typer
 
 from picchio.cli.app import app
 from picchio.cli.options import (
@@ -41,29 +40,14 @@ _STYLES = {"error": "bold red", "warning": "yellow", "note": "dim"}
 
 @app.command()
 def check(
-    campaign: Annotated[
-        Path, typer.Argument(metavar="CAMPAIGN", help="Folder with a campaign.toml.")
-    ],
-    robot: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ROBOT",
-            help="The robot that was measured, as in `picchio robots`; the campaign's own if not "
-            "given.",
-        ),
-    ] = None,
-    no_robot: Annotated[
-        bool, typer.Option("--no-robot", help="Check without a robot: no limits and no axes.")
-    ] = False,
+    campaign: Path,
+    *,
+    robot: str | None = None,
+    no_robot: bool = False,
     flex: FlexOption = None,
     tool: ToolOption = None,
     reducers: ReducersOption = None,
-    keep_going: Annotated[
-        bool,
-        typer.Option(
-            "--keep-going", help="Where a record cannot be read, list it and check the others."
-        ),
-    ] = False,
+    keep_going: bool = False,
     gravity_stiffness: GravityStiffnessOption = None,
     report: ReportOption = None,
     json: JsonOption = None,
@@ -74,6 +58,13 @@ def check(
     delays, records that are too short, aliasing, repeats, and the noise of every channel. --report
     shows how a simulation of the nominal robot, with gravity's stiffness or without, differs.
     Everything is written; then the exit status is 2 where an error was found, 0 otherwise.
+
+    Options:
+        campaign (CAMPAIGN): Folder with a campaign.toml.
+        robot (ROBOT): The robot that was measured, as in `picchio robots`; the campaign's own if
+            not given.
+        no_robot: Check without a robot: no limits and no axes.
+        keep_going: Where a record cannot be read, list it and check the others.
     """
     import math
 

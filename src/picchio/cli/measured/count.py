@@ -45,42 +45,19 @@ if TYPE_CHECKING:
 @app.command()
 def count(
     robot: RobotArgument,
-    ledger: Annotated[
-        Path, typer.Option(metavar="LEDGER", help="The robot's ledger; made where it is missing.")
-    ],
-    log: Annotated[
-        list[Path] | None,
-        typer.Option(
-            metavar="FOLDER",
-            help="Logs: a folder, or a file; may be repeated. Without it: what the ledger holds.",
-        ),
-    ] = None,
-    mapping: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="What the logs' series are (TOML, see `picchio formats mapping`); mapping.toml in "
-            "the folder if not given.",
-        ),
-    ] = None,
+    *,
+    ledger: Path,
+    log: list[Path] | None = None,
+    mapping: Path | None = None,
     task: TaskOption = None,
     flex: FlexOption = None,
     tool: ToolOption = None,
     reducers: ReducersOption = None,
     sn_curve: SNCurveOption = None,
-    watch: Annotated[
-        bool, typer.Option("--watch", help="Go on counting what arrives, until Ctrl-C.")
-    ] = False,
-    every: Annotated[
-        float, typer.Option(metavar="S", min=0.1, help="How often --watch looks, s.")
-    ] = 10.0,
-    hours_per_day: Annotated[
-        float | None,
-        typer.Option(
-            metavar="H", help="How long the robot works a day, h: with it, dates follow from hours."
-        ),
-    ] = None,
-    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Random seed of the draws.")] = 0,
+    watch: bool = False,
+    every: Annotated[float, typer.Option(min=0.1)] = 10.0,
+    hours_per_day: float | None = None,
+    seed: Annotated[int, typer.Option(min=0)] = 0,
     report: ReportOption = None,
     json: JsonOption = None,
 ) -> None:
@@ -88,6 +65,16 @@ def count(
 
     A log that is counted twice counts once; order and cuts of the logs do not matter. Where no log
     shows blows they are those of the task, at the tool's trigger or the task's poses.
+
+    Options:
+        ledger (LEDGER): The robot's ledger; made where it is missing.
+        log (FOLDER): Logs: a folder, or a file; may be repeated. Without it: what the ledger holds.
+        mapping (FILE): What the logs' series are (TOML, see `picchio formats mapping`);
+            mapping.toml in the folder if not given.
+        watch: Go on counting what arrives, until Ctrl-C.
+        every (S): How often --watch looks, s.
+        hours_per_day (H): How long the robot works a day, h: with it, dates follow from hours.
+        seed (N): Random seed of the draws.
     """
     import picchio
     from picchio.studies.default_task import task_of

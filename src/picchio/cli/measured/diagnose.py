@@ -7,8 +7,6 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from picchio.cli.app import app
 from picchio.cli.options import (
     DataOption,
@@ -42,42 +40,15 @@ if TYPE_CHECKING:
 @app.command()
 def diagnose(
     robot: RobotArgument,
+    *,
     data: DataOption,
-    task: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Task whose life is told before and after; the robot's example if not given.",
-        ),
-    ] = None,
-    without: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="EFFECT", help="Leave an effect out, see `picchio effects`; may be repeated."
-        ),
-    ] = None,
-    train: Annotated[
-        list[str] | None,
-        typer.Option(metavar="RECORD", help="Motion record to fit to; may be repeated."),
-    ] = None,
-    held_out: Annotated[
-        list[str] | None,
-        typer.Option(metavar="RECORD", help="Motion record to judge by; may be repeated."),
-    ] = None,
-    model: Annotated[
-        Path | None,
-        output(
-            "--model",
-            "OUT.toml",
-            "Write the extended model; every command takes it as ROBOT.",
-            ".toml",
-        ),
-    ] = None,
+    task: Path | None = None,
+    without: list[str] | None = None,
+    train: list[str] | None = None,
+    held_out: list[str] | None = None,
+    model: Annotated[Path | None, output("--model", ".toml")] = None,
     report: ReportOption = None,
-    plan: Annotated[
-        Path | None,
-        output("--plan", "OUT.toml", "Write what to measure next, for `picchio simulate`."),
-    ] = None,
+    plan: Annotated[Path | None, output("--plan")] = None,
     flex: FlexOption = None,
     tool: ToolOption = None,
     reducers: ReducersOption = None,
@@ -89,6 +60,14 @@ def diagnose(
     The nominal model is fitted within the campaign's tolerance. What it cannot explain is compared
     with every effect that picchio knows; whole poses are held out to judge the gain. It is said
     what the data cannot tell, what to measure to know it, and what the causes do to the life.
+
+    Options:
+        task (FILE): Task whose life is told before and after; the robot's example if not given.
+        without (EFFECT): Leave an effect out, see `picchio effects`; may be repeated.
+        train (RECORD): Motion record to fit to; may be repeated.
+        held_out (RECORD): Motion record to judge by; may be repeated.
+        model (OUT.toml): Write the extended model; every command takes it as ROBOT.
+        plan (OUT.toml): Write what to measure next, for `picchio simulate`.
     """
     import picchio
     from picchio.model.effects.registry import effect_class

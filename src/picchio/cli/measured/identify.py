@@ -34,8 +34,9 @@ if TYPE_CHECKING:
 @app.command()
 def identify(
     robot: RobotArgument,
+    *,
     data: DataOption,
-    out: Annotated[Path, output("--out", "SIDECAR.toml", "Where the sidecar goes.")],
+    out: Annotated[Path, output("--out")],
     flex: FlexOption = None,
     tool: ToolOption = None,
     reducers: ReducersOption = None,
@@ -47,6 +48,9 @@ def identify(
     Static loadings (a weight or a pull, and what moved) tell the stiffness from nothing, with its
     spread and why it is no better known. Of percussion and motion records the values are those of
     the extended model that `picchio diagnose` finds.
+
+    Options:
+        out (SIDECAR.toml): Where the sidecar goes.
     """
     import picchio
     from picchio.diagnosis.identify import needs_springs

@@ -21,40 +21,14 @@ if TYPE_CHECKING:
 
 @app.command("import")
 def import_(
-    file: Annotated[
-        Path,
-        typer.Argument(
-            metavar="FILE",
-            help="CSV of any habit, Parquet, MCAP and .db3 (ROS 2), .bag (ROS 1), UFF 58, MATLAB "
-            ".mat, .lvm, .npz or JSON lines (.jsonl).",
-        ),
-    ],
-    to: Annotated[Path | None, folder("--to", "CAMPAIGN", "The folder of the campaign.")] = None,
-    mapping: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Which channels the file's series become (TOML)."),
-    ] = None,
-    write_mapping: Annotated[
-        Path | None,
-        output(
-            "--write-mapping",
-            "FILE",
-            "Write a mapping that lists the file's series, to edit, and stop there. Series that "
-            "are named as channels or joints, with their units, are filled in.",
-        ),
-    ] = None,
-    robot: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ROBOT", help="For --write-mapping: the robot whose joints the series are of."
-        ),
-    ] = None,
-    name: Annotated[
-        str | None, typer.Option(metavar="R.csv", help="The record's name (.csv or .parquet).")
-    ] = None,
-    append: Annotated[
-        bool, typer.Option("--append", help="Add the record to a campaign that is there.")
-    ] = False,
+    file: Path,
+    *,
+    to: Annotated[Path | None, folder("--to")] = None,
+    mapping: Path | None = None,
+    write_mapping: Annotated[Path | None, output("--write-mapping")] = None,
+    robot: str | None = None,
+    name: str | None = None,
+    append: bool = False,
     report: ReportOption = None,
     json: JsonOption = None,
 ) -> None:
@@ -64,6 +38,17 @@ def import_(
     an accelerometer also level, spectrum, blows, and how the structure rings after them. At a
     terminal it then asks for what no file tells, and writes the mapping. A file with gaps becomes
     several records. The mapping is kept in the campaign's folder as mapping.toml.
+
+    Options:
+        file (FILE): CSV of any habit, Parquet, MCAP and .db3 (ROS 2), .bag (ROS 1), UFF 58, MATLAB
+            .mat, .lvm, .npz or JSON lines (.jsonl).
+        to (CAMPAIGN): The folder of the campaign.
+        mapping (FILE): Which channels the file's series become (TOML).
+        write_mapping (FILE): Write a mapping that lists the file's series, to edit, and stop there.
+            Series that are named as channels or joints, with their units, are filled in.
+        robot (ROBOT): For --write-mapping: the robot whose joints the series are of.
+        name (R.csv): The record's name (.csv or .parquet).
+        append: Add the record to a campaign that is there.
     """
     import picchio
 

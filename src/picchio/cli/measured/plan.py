@@ -36,38 +36,17 @@ if TYPE_CHECKING:
 @app.command()
 def plan(
     robot: RobotArgument,
+    *,
     task: TaskOption = None,
-    budget: Annotated[
-        str, typer.Option(metavar="TIME", help="The time there is, such as 20min, 1h or 900s.")
-    ] = "20min",
-    instruments: Annotated[
-        str,
-        typer.Option(
-            "--with",
-            metavar="NAMES",
-            help="Instruments at hand: scale or weight with dial or tracker; hammer with "
-            "accelerometer.",
-        ),
-    ] = "scale,dial",
-    force: Annotated[
-        float | None,
-        typer.Option(metavar="N", help="How hard to pull; as the task's blows, at most 400."),
-    ] = None,
-    to: Annotated[
-        Path | None,
-        folder(
-            "--to",
-            "FOLDER",
-            "Where the campaign goes: a form to fill in, plan.toml, sheet.html to print.",
-        ),
-    ] = None,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Write over a form that is there, filled in or not.")
-    ] = False,
+    budget: str = "20min",
+    instruments: Annotated[str, typer.Option("--with")] = "scale,dial",
+    force: float | None = None,
+    to: Annotated[Path | None, folder("--to")] = None,
+    overwrite: bool = False,
     flex: FlexOption = None,
     tool: ToolOption = None,
     reducers: ReducersOption = None,
-    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Random seed of the poses.")] = 0,
+    seed: Annotated[int, typer.Option(min=0)] = 0,
     report: ReportOption = None,
     json: JsonOption = None,
 ) -> None:
@@ -76,6 +55,15 @@ def plan(
     Poses, directions and places of the instruments, until the time is up or one more would not
     change the answer. With --flex the sidecar of an earlier `picchio identify` the plan goes on
     from what is known.
+
+    Options:
+        budget (TIME): The time there is, such as 20min, 1h or 900s.
+        instruments (NAMES): Instruments at hand: scale or weight with dial or tracker; hammer with
+            accelerometer.
+        force (N): How hard to pull; as the task's blows, at most 400.
+        to (FOLDER): Where the campaign goes: a form to fill in, plan.toml, sheet.html to print.
+        overwrite: Write over a form that is there, filled in or not.
+        seed (N): Random seed of the poses.
     """
     import picchio
     from picchio.studies.default_task import task_of

@@ -26,28 +26,29 @@ if TYPE_CHECKING:
 @app.command()
 def simulate(
     robot: RobotArgument,
-    plan: Annotated[Path, typer.Option(metavar="PLAN.toml", help="The test plan.")],
-    to: Annotated[Path, folder("--to", "CAMPAIGN", "The folder of the campaign.")],
+    *,
+    plan: Path,
+    to: Annotated[Path, folder("--to")],
     flex: FlexOption = None,
     tool: ToolOption = None,
     reducers: ReducersOption = None,
     gravity_stiffness: GravityStiffnessOption = None,
-    seed: Annotated[
-        int | None,
-        typer.Option(metavar="N", min=0, help="Random seed of the noise; the plan's if not given."),
-    ] = None,
-    parquet: Annotated[
-        bool, typer.Option("--parquet", help="Write Parquet files instead of CSV.")
-    ] = False,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace a campaign that is there.")
-    ] = False,
+    seed: Annotated[int | None, typer.Option(min=0)] = None,
+    parquet: bool = False,
+    overwrite: bool = False,
     json: JsonOption = None,
 ) -> None:
     """The measured data that a test plan would give.
 
     The plan (see `picchio formats plan`) names poses, directions, levels, blows, sample rate and
     sensors with their noise; [[effect]] tables in it make the world differ from the model.
+
+    Options:
+        plan (PLAN.toml): The test plan.
+        to (CAMPAIGN): The folder of the campaign.
+        seed (N): Random seed of the noise; the plan's if not given.
+        parquet: Write Parquet files instead of CSV.
+        overwrite: Replace a campaign that is there.
     """
     import picchio
 

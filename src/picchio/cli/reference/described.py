@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from picchio.cli.app import app
 from picchio.cli.options import JsonOption
@@ -18,12 +16,15 @@ if TYPE_CHECKING:
 
 @app.command()
 def effects(
-    name: Annotated[
-        str | None, typer.Argument(metavar="NAME", help="Show one effect in full.")
-    ] = None,
+    name: str | None = None,
+    *,
     json: JsonOption = None,
 ) -> None:
-    """List the effects that a model may have, or show one in full."""
+    """List the effects that a model may have, or show one in full.
+
+    Options:
+        name (NAME): Show one effect in full.
+    """
     import picchio
 
     show_all(True)  # a reference is read whole
@@ -34,12 +35,15 @@ def effects(
 
 @app.command()
 def formats(
-    name: Annotated[
-        str | None, typer.Argument(metavar="NAME", help="Show one format with all its keys.")
-    ] = None,
+    name: str | None = None,
+    *,
     json: JsonOption = None,
 ) -> None:
-    """List the files that picchio reads and writes, or one's keys."""
+    """List the files that picchio reads and writes, or one's keys.
+
+    Options:
+        name (NAME): Show one format with all its keys.
+    """
     import picchio
 
     show_all(True)

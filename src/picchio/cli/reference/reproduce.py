@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from picchio.cli.app import app
 from picchio.cli.options import JsonOption, ReportOption
@@ -23,26 +21,20 @@ if TYPE_CHECKING:
 
 @app.command()
 def reproduce(
+    *,
     report: ReportOption = None,
-    assume: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME=VALUE",
-            help="Set an input that the paper does not report; may be repeated.",
-        ),
-    ] = None,
-    worlds: Annotated[
-        int | None,
-        typer.Option(
-            metavar="N", help="Random sets of the unreported inputs to try each claim with."
-        ),
-    ] = None,
+    assume: list[str] | None = None,
+    worlds: int | None = None,
     json: JsonOption = None,
 ) -> None:
     """Which claims of the paper behind the method hold.
 
     Figures, tables and claims of Nie et al. (2016) are computed again. What the paper does not
     report is assumed; a claim that depends on it is tried with many sets of assumptions.
+
+    Options:
+        assume (NAME=VALUE): Set an input that the paper does not report; may be repeated.
+        worlds (N): Random sets of the unreported inputs to try each claim with.
     """
     import picchio
     from picchio.paper.study import WORLDS

@@ -18,10 +18,15 @@ if TYPE_CHECKING:
 
 @app.command()
 def robots(
-    every: Annotated[bool, typer.Option("--all", help="All of them, with their sources.")] = False,
+    *,
+    every: Annotated[bool, typer.Option("--all")] = False,
     json: JsonOption = None,
 ) -> None:
-    """List the robots that can be named, arms with data first."""
+    """List the robots that can be named, arms with data first.
+
+    Options:
+        every: All of them, with their sources.
+    """
     import picchio
 
     found = picchio.robots()
@@ -32,13 +37,17 @@ def robots(
 @app.command()
 def annotate(
     robot: RobotArgument,
-    out: Annotated[Path, output("--out", "FILE", "Where the URDF goes.")],
+    *,
+    out: Annotated[Path, output("--out")],
     flex: FlexOption = None,
     json: JsonOption = None,
 ) -> None:
     """Write a URDF with a sidecar's values as annotations.
 
     Everything else stays as it is. Mesh files are not copied.
+
+    Options:
+        out (FILE): Where the URDF goes.
     """
     import picchio
 
