@@ -37,7 +37,14 @@ def test_counts_end_where_nobody_needs_to_know(value, text):
 def test_shares_intervals_and_factors():
     assert [spoken.per_cent(x) for x in (7.91e-9, 0.0868, 1.304, math.nan)] == [
         "about 0", "8.68", "130", "-"]  # fmt: skip
+    assert [spoken.per_cent(x, 2) for x in (0.16, 1.64, 2.41, 12.6)] == [
+        "16",
+        "160",
+        "240",
+        "1,300",
+    ]
     assert spoken.between((0.0912, 0.332), spoken.per_cent) == "9.12 to 33.2"
+    assert spoken.likely((0.26, 2.41)) == "26 to 240"
     assert spoken.between((7.91e-9, 3.95e-8), spoken.per_cent) == "about 0"
     assert [spoken.allowed(e) for e in ((320.0, None), (None, None), (2.0, 2.0))] == [
         "320 to unlimited", "unlimited", "2"]  # fmt: skip

@@ -31,7 +31,7 @@ def number(value: float | None, digits: int = DIGITS, least: float = _ROUNDING) 
     if abs(value) < least:
         return "about 0" if value else "0"
     rounded = float(f"{value:.{digits}g}")
-    if 1e3 <= abs(rounded) < _GROUPED:
+    if min(1e3, 10**digits) <= abs(rounded) < _GROUPED:
         return f"{rounded:,.0f}" if abs(rounded) >= 10 ** (digits - 1) else f"{rounded:,g}"
     mantissa, e, power = f"{rounded:.{digits}g}".partition("e")
     return mantissa + (f"e{int(power)}" if e else "")

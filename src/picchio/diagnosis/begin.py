@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from picchio.campaign.campaign import Campaign
+from picchio.core import spoken
 from picchio.diagnosis.percussion.conclude.holdout import holdout_gain
 from picchio.diagnosis.percussion.data.problem import Problem, held_out
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
@@ -77,8 +78,8 @@ class Begun:
             "The stated stiffness is far off. So the springs were first found from the blows "
             "alone, and the records were then fitted from there. Roughly, as a factor of what was "
             f"stated: {factors}; damping {self.found.damping:.2g}. The stated values leave "
-            f"{100.0 * self.found.before:.3g} % of the response unexplained, these "
-            f"{100.0 * self.found.left:.2g} %."
+            f"{spoken.per_cent(self.found.before)} % of the response unexplained, these "
+            f"{spoken.per_cent(self.found.left, 2)} %."
         )
 
 

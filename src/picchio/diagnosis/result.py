@@ -265,7 +265,7 @@ class Gain:
     def told(self) -> str:
         """The end of a sentence that begins with the records, without its stop."""
         was, now, noise = (
-            f"{100.0 * x:.3g} %"
+            f"{spoken.per_cent(x)} %"
             for x in (self.baseline_nrmse, self.extended_nrmse, self.noise_floor_nrmse)
         )
         way = "falls" if self.extended_nrmse < self.baseline_nrmse else "rises"
@@ -321,7 +321,7 @@ class Left:
         where = f", most of it {' and '.join(most)}" if most else ""
         small = "" if self.within_tolerance else "; a model that is right leaves at most 1 %"
         return (
-            f"beside noise and tolerances {100.0 * self.nrmse:.2g} % of the signal is left"
+            f"beside noise and tolerances {spoken.per_cent(self.nrmse, 2)} % of the signal is left"
             f"{where}{small}"
         )
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from picchio.campaign.campaign import Campaign
 from picchio.campaign.channels import FREQUENCY
+from picchio.core import spoken
 from picchio.core.arrays import FloatArray
 from picchio.core.provenance import provenance
 from picchio.diagnosis.identified import (
@@ -92,8 +93,8 @@ class FrfIdentification(Identification):
         if self.left < _FAR:
             return ""
         return (
-            f"{100 * self.left:.2g} % of the functions are left unexplained: a joint-spring model "
-            "does not follow them, and the intervals do not know that"
+            f"{spoken.per_cent(self.left, 2)} % of the functions are left unexplained: a "
+            "joint-spring model does not follow them, and the intervals do not know that"
         )
 
     @property
@@ -102,8 +103,8 @@ class FrfIdentification(Identification):
         sure = "" if self.decided > _DECISIVE else ", though the other one does about as well"
         return (
             f"{len(list(self.campaign))} functions, {self.fit.problem.rows} lines. With the stated "
-            f"values {100 * self.before:.3g} % of them is left, with those found "
-            f"{100 * self.left:.3g} %; nothing was held out.",
+            f"values {spoken.per_cent(self.before)} % of them is left, with those found "
+            f"{spoken.per_cent(self.left)} %; nothing was held out.",
             f"Damping: {_WORDS[self.convention]}{sure} (log evidence {self.decided:+.1f}).",
         )
 
@@ -310,7 +311,7 @@ def _joints(
         value = float(problem.damping_ratio[k] * math.exp(modal.mean[n + k]))
         reach = math.exp(half * size)
         sure = 0.5 * (reach - 1.0 / reach) <= MOST_HALF and size < 0.5 * problem.damping_std[k]
-        why = "as the modes show it" if sure else f"within a factor of {reach:.2g}"
+        why = "as the modes show it" if sure else f"within a factor of {spoken.number(reach, 2)}"
         ratio = Identified(value, value / reach, value * reach, bool(sure), why)
         joints.append(IdentifiedJoint(joint.name, found[k], ratio))
     return tuple(joints)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from picchio.core import spoken
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.identified import Identified
 from picchio.robot.joint import Joint
@@ -72,7 +73,11 @@ def _why(told: Told, k: int, size: float, known: bool) -> str:
     parts = []
     reach = math.exp(told.half * size)
     half = 0.5 * (reach - 1.0 / reach)
-    share = f"to {100.0 * half:.2g} %" if half < 0.5 else f"within a factor of {reach:.2g}"
+    share = (
+        f"to {100.0 * half:.2g} %"
+        if half < 0.5
+        else f"within a factor of {spoken.number(reach, 2)}"
+    )
     if known:
         parts.append(told.moved[k] or "the tests tell it")
     elif told.doubt[k] > 0.5 * size and told.alone[k] < 0.5 * told.prior[k]:
@@ -82,7 +87,7 @@ def _why(told: Told, k: int, size: float, known: bool) -> str:
         factor = math.exp(1.645 * told.prior[k])
         parts.append(
             "no test moves it enough: it keeps what was known before, a factor of "
-            f"{factor:.2g} either way"
+            f"{spoken.number(factor, 2)} either way"
         )
     else:
         parts.append(f"known {share} only")

@@ -11,6 +11,7 @@ import numpy as np
 
 from picchio.campaign.campaign import Campaign
 from picchio.campaign.loadings import read_loadings
+from picchio.core import spoken
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.core.provenance import provenance
@@ -146,12 +147,12 @@ class StaticIdentification(Identification):
         if math.isnan(alone.nrmse):
             return "Nothing could be left out to judge the fit by: one more record would do"
         said = (
-            f"On what was left out, {100 * alone.before:.3g} % of the signal is left "
-            f"with the stated stiffness, {100 * alone.nrmse:.3g} % with joint springs fitted to "
-            "the others"
+            f"On what was left out, {spoken.per_cent(alone.before)} % of the signal is left "
+            f"with the stated stiffness, {spoken.per_cent(alone.nrmse)} % with joint springs "
+            "fitted to the others"
         )
         if self.named:
-            said += f", {100 * left.nrmse:.3g} % with what else is most probable"
+            said += f", {spoken.per_cent(left.nrmse)} % with what else is most probable"
         return said
 
     @property
