@@ -120,6 +120,7 @@ def test_arms_of_any_size_are_believed(write, size):
         (2, {"ixx": 4e-4, "iyy": 4e-4, "izz": 3e-4}, "doubtful",
          "it looks some 900 times too small"),
         (3, {"value": 600.0}, "doubtful", "a decimal point, or grams?"),
+        (3, {"value": 6000.0}, "impossible", "a decimal point, or grams?"),
         (6, {"value": 400.0}, "doubtful", "a decimal point, or grams?"),
     ],
 )  # fmt: skip

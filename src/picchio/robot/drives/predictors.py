@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from picchio.core import spoken
 from picchio.core.errors import InputError
 from picchio.robot.spread import is_estimate
 
@@ -179,7 +180,7 @@ def placeholders(robot: FlexibleRobot) -> dict[str, str]:
             worst = max(weak, key=lambda joint: own[joint.name] / joint.effort)
             why = (
                 f"{worst.name} could not hold the arm's own links: they take "
-                f"{own[worst.name]:.3g} {unit}, and its limit is {worst.effort:g} {unit}"
+                f"{spoken.number(own[worst.name])} {unit}, and its limit is {worst.effort:g} {unit}"
             )
         else:
             continue

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from lxml import etree
 
+from picchio.core import spoken
 from picchio.core.arrays import FloatArray, symmetric
 from picchio.core.errors import InputError
 from picchio.robot.finding import Finding, Severity
@@ -40,7 +41,7 @@ _SUSPECT = 2.0
 # of the mean of all, in 95 of 100 cases 0.1 to 2; half of them near 0.5.
 _LARGE, _TYPICAL = 5.0, 0.5
 # In 289 public URDFs at most 24 times, of torsos; a hundred and more only of broken ones.
-_HEAVIER = 30.0
+_HEAVIER, _BROKEN = 30.0, 100.0
 # Of the largest moment: so much the digits that files have may leave above the others' sum.
 _PRINTED = 1e-3
 # Of a joint's inertia: less of it than links are known to (3 %) changes no answer.
@@ -203,11 +204,15 @@ def _heavy(robot: FlexibleRobot) -> Iterator[Finding]:
     for k, (joint, mass) in enumerate(zip(chain, masses, strict=True)):
         others = masses[max(k - 1, 0) : k] + masses[k + 1 : k + 2]
         if mass > _HEAVIER * max(others, default=mass) > 0.0:
+            times = mass / max(others)
+            # A carriage or a gun may be heavy, too; a link between two others is not.
+            broken = times > _BROKEN and 0 < k < len(masses) - 1
             yield Finding(
                 f"link {joint.child!r}",
-                f"{mass:.3g} kg with what is fixed to it, {mass / max(others):.3g} times the "
-                "heavier of its neighbours",
+                f"{spoken.number(mass)} kg with what is fixed to it, {spoken.number(times)} times "
+                "the heavier of its neighbours",
                 "a decimal point, or grams?",
+                "impossible" if broken else "doubtful",
             )
 
 
