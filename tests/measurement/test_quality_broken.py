@@ -1,10 +1,15 @@
 """Every way to spoil measured data that still can be read: the right check says so, in one line."""
 
+import ast
+import inspect
+import string
+import textwrap
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from picchio.measurement.quality.check import catalogue
 from picchio.measurement.quality.checks import CHECKS
 from picchio.measurement.quality.report import check
 from picchio.robot.loading.load import load_robot
@@ -36,6 +41,24 @@ def test_there_are_enough_of_them():
     assert {check for _, check in SPOILERS.values()} >= {
         kind.name for kind in CHECKS if kind.name not in ("axes", "phase")
     }
+
+
+@pytest.mark.parametrize("kind", CHECKS, ids=lambda kind: kind.name)
+def test_every_finding_has_its_words_and_they_what_they_are_filled_in_with(kind):
+    tree = ast.parse(textwrap.dedent(inspect.getsource(kind)))
+    texts = {n.value for n in ast.walk(tree) if isinstance(n, ast.Constant)}  # keys among them
+    says = {key: entry for key, entry in catalogue()[kind.name].items() if key != "what"}
+    assert says.keys() <= texts
+    for call in ast.walk(tree):
+        if not (isinstance(call, ast.Call) and ast.unparse(call.func) == "self.found"):
+            continue
+        told = [n.value for n in ast.walk(call.args[0]) if isinstance(n, ast.Constant)]
+        keys = [key for key in told if isinstance(key, str)]
+        assert set(keys) <= says.keys()
+        given = {word.arg for word in call.keywords} | ({"value"} if len(call.args) > 3 else set())
+        for key in keys:
+            text = "".join(says[key].get(part, "") for part in ("message", "advice", "unit"))
+            assert {name for _, name, _, _ in string.Formatter().parse(text) if name} <= given
 
 
 @pytest.mark.parametrize("seed", [0, *(pytest.param(s, marks=pytest.mark.slow) for s in (1, 2))])

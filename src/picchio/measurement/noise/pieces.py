@@ -178,7 +178,7 @@ def repeat_pieces(one: Window, other: Window) -> Iterator[tuple[str, Piece]]:
     time = one.time[a]
     if time.size < _FEWEST:
         return
-    for name in one.arrays.keys() & other.arrays.keys():
+    for name in (name for name in one.arrays if name in other.arrays):
         difference = (other.arrays[name][b] - one.arrays[name][a]) / np.sqrt(2.0)
         yield name, Piece("repeats", f"{one.record.file}, {other.record.file}", time,
                           difference - difference.mean(), time.size - 1,

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import tomllib
+from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 from picchio.campaign.campaign import Campaign
@@ -13,6 +17,12 @@ from picchio.robot.flexible_robot import FlexibleRobot
 
 Severity = Literal["error", "warning", "note"]
 SEVERITIES: tuple[Severity, ...] = ("error", "warning", "note")
+
+
+@cache
+def catalogue() -> dict[str, dict[str, Any]]:
+    """What each check looks for and may say, by its name: see `findings.toml`."""
+    return tomllib.loads(Path(__file__).with_name("findings.toml").read_text(encoding="utf-8"))
 
 
 @dataclass(frozen=True)
@@ -47,7 +57,7 @@ class Finding:
 
     def to_dict(self) -> dict[str, Any]:
         """For JSON."""
-        return {name: getattr(self, name) for name in self.__dataclass_fields__}
+        return dict(vars(self))
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,19 +93,19 @@ class Check:
     """Sees the records one by one, and may report at each of them and at the end.
 
     Attributes:
-        name: in findings.
-        what: what it looks for, in words.
+        name: in findings, and of its table in `findings.toml`.
         of: the kind of records that it sees, "percussion" or "motion"; all where empty.
         told: what has been reported, and is not to be at the next record.
+        kept: what is kept of the records until the end.
     """
 
     name: ClassVar[str]
-    what: ClassVar[str]
     of: ClassVar[str] = ""
 
     def __init__(self, context: Context) -> None:
         self.context = context
         self.told: set[str] = set()
+        self.kept: defaultdict[Any, list[Any]] = defaultdict(list)
 
     def record(self, scan: RecordScan) -> Iterable[Finding]:
         """Findings in one record."""
@@ -105,8 +115,31 @@ class Check:
         """Findings in all records together."""
         return ()
 
-    def found(self, severity: Severity, message: str, advice: str = "", *,
-              record: str | None = None, channel: str | None = None,
-              value: float | None = None, unit: str = "") -> Finding:  # fmt: skip
-        """A finding of this check."""
-        return Finding(self.name, severity, message, advice, record, channel, value, unit)
+    def found(
+        self,
+        key: str,
+        record: str | None = None,
+        channel: str | None = None,
+        value: float | None = None,
+        *,
+        mild: bool = False,
+        **words: object,
+    ) -> Finding:
+        """A finding of this check.
+
+        Args:
+            key: of its table in `findings.toml`.
+            record: the record's file; None for the campaign.
+            channel: channel, channel group, joint or frame; None for the whole record.
+            value: the number found.
+            mild: whether it is but a note.
+            words: what else its texts are filled in with.
+        """
+        says = catalogue()[self.name][key]
+        message, advice, unit = (
+            says.get(part, "").format(value=value, **words)
+            for part in ("message", "advice", "unit")
+        )
+        severity: Severity = "note" if mild else says["severity"]
+        number = None if value is None else float(value)
+        return Finding(self.name, severity, message, advice, record, channel, number, unit)

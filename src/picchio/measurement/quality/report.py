@@ -20,7 +20,7 @@ from picchio.core.results import TableResult
 from picchio.measurement.noise.estimate import NoiseCollector
 from picchio.measurement.noise.level import Noise
 from picchio.measurement.noise.window import read_window
-from picchio.measurement.quality.check import SEVERITIES, Check, Context, Finding
+from picchio.measurement.quality.check import SEVERITIES, Check, Context, Finding, catalogue
 from picchio.measurement.quality.checks import CHECKS
 from picchio.measurement.quality.checks.repeats import Comparison, RepeatsCheck
 from picchio.measurement.quality.scan import RecordScan, scan_record
@@ -65,7 +65,7 @@ class RecordSummary:
 
     def to_dict(self) -> dict[str, Any]:
         """For JSON."""
-        return {name: getattr(self, name) for name in self.__dataclass_fields__}
+        return dict(vars(self))
 
 
 def summarise(scan: RecordScan) -> RecordSummary:
@@ -295,7 +295,7 @@ def check(
         tuple(findings),
         context.noise,
         tuple(repeats),
-        {kind.name: kind.what for kind in CHECKS},
+        {kind.name: catalogue()[kind.name]["what"] for kind in CHECKS},
     )
 
 

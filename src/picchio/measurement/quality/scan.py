@@ -130,10 +130,11 @@ class RecordScan:
         """The record's name."""
         return self.record.file
 
-    def line(self, sample: int) -> str:
+    def place(self, sample: int) -> str:
         """Where a sample is, in words."""
         source = self.record.source
-        return f"{source.row_word} {sample + source.first_row}"
+        line = f"{source.row_word} {sample + source.first_row}"
+        return f"{line}, t = {self.when(sample):.4g} s"
 
     def when(self, sample: int) -> float:
         """s, the time of a sample."""

@@ -20,22 +20,21 @@ from picchio.measurement.quality.scan import RecordScan
 _SAMPLES = 400
 _SMOOTH = 0.05
 _FEWEST = 50
-Pair = tuple[FloatArray, FloatArray]
 
 
 class MotionAxesCheck(Check):
-    """Positions, velocities and torques of motion records against one another."""
+    """Positions, velocities and torques of motion records against one another.
+
+    By joint's number and torque's channel it keeps what was seen and what all joints must show.
+    """
 
     name = "joints"
-    what = "motion: positions, velocities and torques consistent with one another and with gravity"
     of = "motion"
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
         # Joints whose load depends on where nobody knows others stand.
         self._rests: set[str] = set()
-        # (joint's number, torque's channel): what was seen and what all joints must show.
-        self._torques: dict[tuple[int, str], list[Pair]] = defaultdict(list)
 
     def record(self, scan: RecordScan) -> Iterator[Finding]:
         """Velocity, motor and reference against position; torques are kept for the end."""
@@ -69,12 +68,8 @@ class MotionAxesCheck(Check):
         self._rests = set(robot.resting_on(unknown))
         needed = [joint for joint in moved if joint in self._rests]
         matters = f"; what {', '.join(needed)} must carry depends on it" if needed else ""
-        yield self.found(
-            "warning" if needed else "note",
-            f"has no angle of {', '.join(unknown)}: taken to stand at 0{matters}",
-            "say where they stand as `pose` of the record",
-            record=scan.file,
-        )
+        yield self.found("standing", scan.file, joints=", ".join(unknown), matters=matters,
+                         mild=not needed)  # fmt: skip
 
     def _follows(self, scan: RecordScan, name: str, leader: FloatArray, what: str,
                  zero: bool = False) -> Iterator[Finding]:  # fmt: skip
@@ -90,18 +85,12 @@ class MotionAxesCheck(Check):
         likeness = float(a @ b) / np.sqrt(power * other)
         slope = float(a @ b) / power
         if likeness < -0.7:
-            yield self.found("warning", f"runs against the {what}: its sign is flipped",
-                             "correct the sign", record=scan.file, channel=name,
-                             value=likeness)  # fmt: skip
+            yield self.found("flipped", scan.file, name, likeness, leader=what)
         elif likeness < 0.5:
-            yield self.found("warning", f"does not follow the {what} (correlation "
-                             f"{likeness:.2f})", "are joints swapped?", record=scan.file,
-                             channel=name, value=likeness)  # fmt: skip
+            yield self.found("unlike", scan.file, name, likeness, leader=what)
         elif not 0.6 < slope < 1.6:
             degrees = " (57.3: degrees?)" if 0.8 < max(slope, 1 / slope) / 57.3 < 1.25 else ""
-            yield self.found("warning", f"is {slope:.3g} times the {what}{degrees}",
-                             "check its unit, and the gear ratio", record=scan.file,
-                             channel=name, value=slope)  # fmt: skip
+            yield self.found("factor", scan.file, name, slope, leader=what, degrees=degrees)
 
     def _keep_torques(
         self, scan: RecordScan, joints: dict[str, FloatArray], torques: dict[str, str]
@@ -136,14 +125,14 @@ class MotionAxesCheck(Check):
             q, _ = np.linalg.qr(basis)
             left = [v - q @ (q.T @ v) for v in (seen, must)]
             number = robot.joint_names.index(joint)
-            self._torques[number, torques[joint]].append((left[0], left[1].T))
+            self.kept[number, torques[joint]].append((left[0], left[1].T))
 
     def finish(self) -> Iterator[Finding]:
         """Torques against gravity and masses, all records together."""
         robot = self.context.robot
         if robot is None:
             return
-        for (own, channel), rows in self._torques.items():
+        for (own, channel), rows in self.kept.items():
             seen = np.concatenate([row[0] for row in rows])
             must = np.concatenate([row[1] for row in rows], axis=1)
             likeness = cosines(seen, must)
@@ -152,21 +141,15 @@ class MotionAxesCheck(Check):
                 continue
             best = int(np.abs(likeness).argmax())
             if likeness[own] < -0.6:
-                yield self.found("warning", "runs against gravity and the masses: its sign is "
-                                 f"flipped (correlation {likeness[own]:.2f})",
-                                 "correct the sign of the torque, or of the position",
-                                 channel=channel, value=float(likeness[own]))  # fmt: skip
+                yield self.found("torque-flipped", None, channel, likeness[own])
             elif best != own and abs(likeness[best]) > 0.93 and likeness[own] < 0.4:
-                yield self.found("warning", f"follows what {robot.joint_names[best]} must carry, "
-                                 f"not {robot.joint_names[own]}: joints are swapped",
-                                 "relabel the columns", channel=channel,
-                                 value=float(likeness[own]))  # fmt: skip
+                names = robot.joint_names
+                yield self.found("torque-swapped", None, channel, likeness[own], other=names[best],
+                                 own=names[own])  # fmt: skip
             elif likeness[own] > 0.8:
                 slope = float(seen @ must[own] / (must[own] @ must[own]))
                 if not 0.125 < slope < 8.0:
-                    yield self.found("warning", f"is {slope:.3g} times what gravity and the masses "
-                                     "ask for", "check its unit, the gear ratio, and the payload",
-                                     channel=channel, value=slope)  # fmt: skip
+                    yield self.found("torque-factor", None, channel, slope)
 
 
 def _roles(window: Window) -> dict[str, dict[str, str]]:

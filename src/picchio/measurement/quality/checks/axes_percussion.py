@@ -34,7 +34,6 @@ class PercussionAxesCheck(Check):
     """Which way each sensor starts to move, against which way it must."""
 
     name = "axes"
-    what = "axes and joints swapped or flipped: the first milliseconds of a blow"
     of = "percussion"
 
     def __init__(self, context: Context) -> None:
@@ -96,32 +95,20 @@ class PercussionAxesCheck(Check):
             self.context.told.add(group)
             others = f" (or {fit.rivals} other ways: these directions cannot tell them apart)"
             yield self.found(
-                "warning",
-                f"its axes seem swapped or flipped: {fit.words}{others if fit.rivals else ''}. The "
-                f"first milliseconds agree to {100 * fit.best:.0f} % with the expected direction, "
-                f"as labelled to {100 * fit.as_labelled:.0f} %",
-                "check how the sensor is mounted, then relabel the columns",
-                channel=group, value=fit.as_labelled,
+                "relabel", None, group, fit.as_labelled, words=fit.words,
+                others=others if fit.rivals else "", best=100 * fit.best,
+                labelled=100 * fit.as_labelled,
             )  # fmt: skip
         elif fit.as_labelled < 0.7:
-            yield self.found(
-                "warning",
-                "starts to move in another direction than the robot's masses allow (cosine "
-                f"{fit.as_labelled:.2f} over {len(rows)} records)",
-                "check the sensor's mounting, the poses and the force's directions",
-                channel=group, value=fit.as_labelled,
-            )  # fmt: skip
+            yield self.found("direction", None, group, fit.as_labelled, records=len(rows))
         yield from self._judge_size(group, ratio, 2.5)
 
     def _judge_size(self, channel: str, ratio: float, most: float) -> Iterator[Finding]:
         if 1.0 / most < ratio < most:
             return
-        close = [text for f, text in _FACTORS.items()
-                 if min(abs(np.log(ratio / f)), abs(np.log(ratio * f))) < 0.35]  # fmt: skip
-        yield self.found("warning", f"starts {ratio:.3g} times as strongly as the robot's masses "
-                         "allow", "check the unit: " + close[0] if close else
-                         "check the unit, the sensitivity, and the force",
-                         channel=channel, value=ratio)  # fmt: skip
+        close = [w for f, w in _FACTORS.items() if abs(abs(np.log(ratio)) - np.log(f)) < 0.35]
+        guess = f": {close[0]}" if close else ", the sensitivity, and the force"
+        yield self.found("size", None, channel, ratio, guess=f"check the unit{guess}")
 
     def _judge_joint(self, channel: str, own: int, rows: list[Pair]) -> Iterator[Finding]:
         assert self.context.robot is not None
@@ -132,14 +119,10 @@ class PercussionAxesCheck(Check):
         likeness = cosines(seen, must)
         best = int(np.abs(likeness).argmax())
         if best == own and likeness[own] < -0.8:
-            yield self.found("warning", "starts the wrong way: its sign is flipped",
-                             "it must be link side minus motor side",
-                             channel=channel, value=float(likeness[own]))  # fmt: skip
+            yield self.found("flipped", None, channel, likeness[own])
         elif best != own and len(rows) >= 4 and abs(likeness[best]) > 0.95 and likeness[own] < 0.6:
             sign = "minus " if likeness[best] < 0.0 else ""
-            yield self.found("warning", f"moves like {sign}{names[best]}: joints are swapped",
-                             "relabel the columns", channel=channel,
-                             value=float(likeness[own]))  # fmt: skip
+            yield self.found("swapped", None, channel, likeness[own], other=sign + names[best])
         if likeness[own] > 0.9:
             size = float(seen @ must[own] / max(float(must[own] @ must[own]), 1e-12))
             yield from self._judge_size(channel, size, 3.0)

@@ -1,4 +1,4 @@
-"""Do the blows have the programmed timing, number and force?"""
+"""Is the record long enough, and do the blows have the programmed timing, number and force?"""
 
 from __future__ import annotations
 
@@ -12,16 +12,69 @@ from picchio.measurement.noise.window import Window
 from picchio.measurement.quality.check import Check, Finding
 from picchio.measurement.quality.scan import RecordScan
 
+_PERIODS = 3.0
 _SIGMAS = 7.0
-_FACTORS = {1e3: "N or kN?", 1e-3: "N or kN?", 4.448: "N or lbf?", 1 / 4.448: "N or lbf?",
-            9.81: "N or kgf?", 1 / 9.81: "N or kgf?"}  # fmt: skip
+_FACTORS = {1e3: "N or kN?", 4.448: "N or lbf?", 9.81: "N or kgf?"}
+
+
+class LengthCheck(Check):
+    """Records that begin too late or end too early."""
+
+    name = "length"
+    of = "percussion"
+
+    def record(self, scan: RecordScan) -> Iterator[Finding]:
+        """One percussion record."""
+        window, clock = scan.window, scan.clock
+        blows = window.blows
+        if blows is None:
+            return
+        if window.steady:
+            periods = (clock.end - clock.start + clock.step) / blows.period
+            if periods < _PERIODS - 1e-6:
+                key = "no-period" if periods < 1.0 - 1e-6 else "few-periods"
+                yield self.found(key, scan.file, None, periods, period=1e3 * blows.period)
+            return
+        width = blows.width or 0.0
+        if clock.start > max(0.5 * width, 1.01 * clock.step):
+            yield self.found("late", scan.file, None, clock.start)
+        elif window.quiet().stop < 20:
+            yield self.found("no-quiet", scan.file, None, window.quiet().stop)
+        hits = window.record.hits
+        last = ((hits or 1) - 1) * blows.period + width
+        if clock.end < last:
+            seen = int(max(0.0, np.floor((clock.end - width) / blows.period) + 1))
+            yield self.found("early", scan.file, None, clock.end, last=last, seen=seen, hits=hits)
+        elif window.complete:
+            yield from self._ring_down(scan)
+
+    def _ring_down(self, scan: RecordScan) -> Iterator[Finding]:
+        window = scan.window
+        worst, where = 0.0, ""
+        for name, values in window.arrays.items():
+            std = self.context.std(name) + self.context.hum(name)
+            part = values[window.after()]
+            size = max(16, values.size // 20)
+            if window.channels[name].kind.of_force or values.size < 4 * size:
+                continue
+            power = values[: values.size // size * size].reshape(-1, size)
+            loudest = float(np.sqrt((power**2).mean(axis=1).max()))
+            # A joint may come to rest elsewhere: about the mean of the end.
+            rest = float(values[-4 * size :].mean())
+            end = float(np.sqrt(np.mean((values[-size:] - rest) ** 2)))
+            if part.size >= size and end > 4.0 * std and loudest > 0.0 and end / loudest > worst:
+                worst, where = end / loudest, name
+            elif part.size < size and loudest > 4.0 * std:
+                worst, where = 1.0, name
+        if worst > 0.1:
+            yield self.found("ringing", scan.file, where, worst, percent=100 * worst,
+                             mild=worst <= 0.6)  # fmt: skip
 
 
 class BlowsCheck(Check):
     """The measured force against the programmed one; t = 0 against the first movement."""
 
     name = "blows"
-    what = "t = 0 at the first blow; measured blows as programmed"
     of = "percussion"
 
     def record(self, scan: RecordScan) -> Iterator[Finding]:
@@ -31,48 +84,36 @@ class BlowsCheck(Check):
             if channel.kind.of_force and window.blows is not None:
                 yield from self._force(scan, name, window.blows)
         yield from self._onset(scan)
-        if scan.file in self.context.periods:
-            programmed, found = self.context.periods[scan.file]
-            if abs(found / programmed - 1.0) > 2e-3:
-                yield self.found(
-                    "warning",
-                    f"repeats every {1e3 * found:.4g} ms, not every {1e3 * programmed:.4g} ms as "
-                    "programmed",
-                    "correct the period, or the clock", record=scan.file,
-                    value=found, unit="s",
-                )  # fmt: skip
+        programmed, found = self.context.periods.get(scan.file, (1.0, 1.0))
+        if abs(found / programmed - 1.0) > 2e-3:
+            yield self.found("steady-period", scan.file, None, found, found=1e3 * found,
+                             programmed=1e3 * programmed)  # fmt: skip
 
     def _force(self, scan: RecordScan, channel: str, blows: Excitation) -> Iterator[Finding]:
-        window = scan.window
-        force = window.arrays[channel] - blows.preload
+        force = scan.window.arrays[channel] - blows.preload
         programmed = blows.peak_force
         if not force.any() or programmed <= 0.0:
             return
-        name = {"record": scan.file, "channel": channel}
         if -force.min() > 2.0 * force.max():
-            yield self.found("warning", "the blows are negative: the force is flipped",
-                             "it must be the tool's force on the robot along `direction`",
-                             value=float(force.min()), unit="N", **name)  # fmt: skip
+            yield self.found("flipped", scan.file, channel, force.min())
             force = -force
-        peak = float(np.median(force[force > 0.6 * force.max()]))
-        if not blows.flat:
-            peak = float(force.max())
+        peak = float(force.max())
+        if blows.flat:
+            peak = float(np.median(force[force > 0.6 * peak]))
         ratio = peak / programmed
-        if not 1.0 / 3.0 < ratio < 3.0:
-            close = [w for f, w in _FACTORS.items() if abs(np.log(ratio / f)) < 0.25]
-            yield self.found("warning", f"the blows are {peak:.4g} N high, programmed are "
-                             f"{programmed:.4g} N", close[0] if close else "which one is right?",
-                             value=ratio, **name)  # fmt: skip
-        elif abs(ratio - 1.0) > max(0.03, 2.5 * self.context.campaign.tolerance.force):
-            yield self.found("warning", f"the blows are {peak:.4g} N high, programmed are "
-                             f"{programmed:.4g} N: {100 * (ratio - 1):+.0f} %",
-                             "state the measured force, or check the cell's calibration",
-                             value=ratio, **name)  # fmt: skip
-        yield from self._timing(window, blows, force, peak, name)
+        factor = not 1.0 / 3.0 < ratio < 3.0
+        if factor or abs(ratio - 1.0) > max(0.03, 2.5 * self.context.campaign.tolerance.force):
+            close = [w for f, w in _FACTORS.items() if abs(abs(np.log(ratio)) - np.log(f)) < 0.25]
+            yield self.found(
+                "factor" if factor else "size", scan.file, channel, ratio, peak=peak,
+                programmed=programmed, percent=100 * (ratio - 1),
+                guess=close[0] if close else "which one is right?",
+            )  # fmt: skip
+        yield from self._timing(scan.window, blows, force, peak, channel)
 
     def _timing(self, window: Window, blows: Excitation, force: FloatArray, peak: float,
-                name: dict[str, str]) -> Iterator[Finding]:  # fmt: skip
-        hits = window.record.hits
+                channel: str) -> Iterator[Finding]:  # fmt: skip
+        file, hits = window.record.file, window.record.hits
         above = force > 0.5 * peak
         rising = np.flatnonzero(above[1:] & ~above[:-1]) + 1
         # Noise at the threshold is not another blow.
@@ -81,23 +122,16 @@ class BlowsCheck(Check):
         times = times[np.insert(np.diff(times) > max(0.25 * blows.period, 0.5 * width), 0, True)]
         if not times.size:
             return
-        slack = max(1.6 * window.step, 0.25 * width)
-        if hits is not None and abs(times[0]) > slack:
-            text = f"the first blow begins at {1e3 * times[0]:.3g} ms, not at t = 0"
-            yield self.found("warning", text, "shift the time", value=float(times[0]),
-                             unit="s", **name)  # fmt: skip
+        if hits is not None and abs(times[0]) > max(1.6 * window.step, 0.25 * width):
+            yield self.found("begin", file, channel, times[0], at=1e3 * times[0])
         if hits is not None and window.complete and times.size != hits:
-            yield self.found("warning", f"{times.size} blows are seen, {hits} are programmed",
-                             "correct `hits`, or note the misses", value=float(times.size),
-                             unit="blows", **name)  # fmt: skip
+            yield self.found("number", file, channel, times.size, hits=hits)
         if times.size >= 3 and (hits is None or times.size == hits):
             period = (times[-1] - times[0]) / (times.size - 1)
             slip = 2.0 * window.step / (times[-1] - times[0])
             if abs(period / blows.period - 1.0) > 2e-3 + slip:
-                yield self.found("warning", f"a blow comes every {1e3 * period:.4g} ms, programmed "
-                                 f"are {1e3 * blows.period:.4g} ms",
-                                 "correct the period, or the clock", value=float(period),
-                                 unit="s", **name)  # fmt: skip
+                yield self.found("period", file, channel, period, found=1e3 * period,
+                                 programmed=1e3 * blows.period)  # fmt: skip
 
     def _onset(self, scan: RecordScan) -> Iterator[Finding]:
         window = scan.window
@@ -117,14 +151,9 @@ class BlowsCheck(Check):
         if not onsets:
             return
         name = min(onsets, key=lambda key: onsets[key])
-        first = onsets[name]
-        blows = window.blows
+        first, blows = onsets[name], window.blows
         late = 2.0 * ((blows.width if blows is not None else None) or 0.0) + 5e-3
         if first < -2.0 * window.step:
-            yield self.found("warning", f"moves {-1e3 * first:.3g} ms before the first blow",
-                             "t = 0 must be the first blow's first edge: shift the time",
-                             record=scan.file, channel=name, value=first, unit="s")  # fmt: skip
+            yield self.found("moves-before", scan.file, name, first, at=-1e3 * first)
         elif first > max(late, 8.0 * window.step):
-            yield self.found("warning", f"nothing moves until {1e3 * first:.3g} ms after the first "
-                             "blow", "t = 0 must be the first blow's first edge: shift the time",
-                             record=scan.file, channel=name, value=first, unit="s")  # fmt: skip
+            yield self.found("moves-late", scan.file, name, first, at=1e3 * first)

@@ -30,7 +30,6 @@ class PhaseCheck(Check):
     """Phases of the ring-down's waves between the channels of one frame, or the deflections."""
 
     name = "phase"
-    what = "an accelerometer's high-pass, delays between sensors (their phase in the ring-down)"
     of = "percussion"
 
     def __init__(self, context: Context) -> None:
@@ -145,14 +144,8 @@ class PhaseCheck(Check):
                 continue
             if ways.as_labelled < 0.6 and ways.best > 0.9:
                 self.context.told.add(group)
-                yield self.found(
-                    "warning",
-                    f"its axes seem swapped or flipped: {ways.words}. The ring-down fits the other "
-                    f"channels to {100 * ways.best:.0f} %, as labelled to "
-                    f"{100 * ways.as_labelled:.0f} %",
-                    "check how the sensor is mounted, then relabel the columns",
-                    channel=group, value=ways.as_labelled,
-                )  # fmt: skip
+                yield self.found("relabel", None, group, ways.as_labelled, words=ways.words,
+                                 best=100 * ways.best, labelled=100 * ways.as_labelled)  # fmt: skip
         for (group, by_robot), points in self._points.items():
             if group in self.context.told:
                 continue  # phases of the wrong axes mean nothing
@@ -162,24 +155,11 @@ class PhaseCheck(Check):
                 continue
             corner, corner_error, delay, delay_error = fit
             if corner > max(5.0 * corner_error, 0.15):
-                yield self.found(
-                    "warning",
-                    f"leads {against} more at low frequencies, as after a high-pass of "
-                    f"{corner:.2g} Hz",
-                    "switch the sensor to DC, or add the filter to the model (sensor_highpass)",
-                    channel=group, value=corner, unit="Hz",
-                )  # fmt: skip
+                yield self.found("highpass", None, group, corner, against=against)
             if abs(delay) > max(5.0 * delay_error, 3e-4):
-                word = "later" if delay > 0.0 else "earlier"
-                yield self.found(
-                    "warning",
-                    f"reads {1e3 * abs(delay):.2g} ms {word} than {against}"
-                    + (f" (or through a low-pass of {1 / (2 * np.pi * delay):.2g} Hz)"
-                       if delay > 0.0 else ""),
-                    "are the recorders started by one trigger? shift its time, or add the delay "
-                    "to the model (sensor_delay)",
-                    channel=group, value=delay, unit="s",
-                )  # fmt: skip
+                yield self.found("later" if delay > 0.0 else "earlier", None, group, delay,
+                                 late=1e3 * delay, early=-1e3 * delay, against=against,
+                                 corner=1 / (2 * np.pi * delay))  # fmt: skip
 
 
 def _amplitudes(window: Window, after: slice, names: list[str], poles: ComplexArray,

@@ -38,7 +38,6 @@ class RepeatsCheck(Check):
     """Each record against the one before it of the same pose, direction and blows."""
 
     name = "repeats"
-    what = "records that repeat each other"
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
@@ -51,12 +50,16 @@ class RepeatsCheck(Check):
         worst = self._compare(before, scan.window) if before is not None else None
         if worst is not None:
             self.comparisons.append(worst)
-            yield from self._judge(worst)
+            if worst.over_noise > 1.3 and worst.difference > 0.03:
+                percent = 100 * worst.difference
+                yield self.found("differs", worst.second, worst.channel, worst.difference,
+                                 first=worst.first, percent=percent, scale=worst.scale,
+                                 mild=worst.difference <= 0.1)  # fmt: skip
 
     def _compare(self, one: Window, other: Window) -> Comparison | None:
         first, second = overlap(one, other)
         worst: Comparison | None = None
-        for name in one.arrays.keys() & other.arrays.keys():
+        for name in (name for name in one.arrays if name in other.arrays):
             a, b = one.arrays[name][first], other.arrays[name][second]
             if a.size < 64 or one.channels[name].kind.of_force:
                 continue
@@ -74,24 +77,11 @@ class RepeatsCheck(Check):
                 worst = found
         return worst
 
-    def _judge(self, worst: Comparison) -> Iterator[Finding]:
-        if worst.over_noise > 1.3 and worst.difference > 0.03:
-            loud = worst.difference > 0.1
-            yield self.found(
-                "warning" if loud else "note",
-                f"differs from its repeat {worst.first} by {100 * worst.difference:.2g} % of the "
-                f"signal beyond the noise; its best scale is {worst.scale:.3g}",
-                "blows, temperature or fixture changed between them; or one pose or direction is "
-                "wrong",
-                record=worst.second, channel=worst.channel, value=worst.difference,
-            )  # fmt: skip
-
 
 class CopiesCheck(Check):
     """Channels or records that are equal bit for bit: noise never is."""
 
     name = "copies"
-    what = "channels or records that are exact copies"
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
@@ -110,14 +100,10 @@ class CopiesCheck(Check):
                 continue
             digest = hashlib.sha256(values.tobytes()).digest()
             if digest in seen:
-                yield self.found("warning", f"equals {seen[digest]} in every sample",
-                                 "one of them is a copy: find out which sensor it is",
-                                 record=scan.file, channel=name)  # fmt: skip
+                yield self.found("channel", scan.file, name, other=seen[digest])
             seen.setdefault(digest, name)
             known = self._records.get(digest)
             if known and known[1] == name and not told and kind.motion != "reference":
                 told = True
-                yield self.found("warning", f"equals that of {known[0]} in every sample",
-                                 "one record was saved twice: leave it out",
-                                 record=scan.file, channel=name)  # fmt: skip
+                yield self.found("record", scan.file, name, other=known[0])
             self._records.setdefault(digest, (scan.file, name))
