@@ -7,7 +7,7 @@ from numba import njit
 
 from picchio.core.arrays import FloatArray
 from picchio.fatigue.counting.kernel import finish, push
-from picchio.studies.rivet.damage_kernel import cost_of, swing
+from picchio.studies.rivet.damage_kernel import cycles_damage, residue_damage, swing
 from picchio.vibration.batch.turning_kernel import FINE
 
 MOST = 96
@@ -133,30 +133,18 @@ def burst_damages(  # type: ignore[no-untyped-def]
             if known[j] < 0:
                 continue
             stress = factor[b, j] * stiffness[b, j]
+            curve = knots[j, : known[j]], lines[j, : known[j] + 1]
             depth, cycles = push(own, stack, 0, ranges, means)
-            top = 0.5 * stress
-            own_knots, own_lines = knots[j, : known[j]], lines[j, : known[j] + 1]
-            for part_of in range(2):
-                for s in range(scales.size):
-                    total = 0.0
-                    for c in range(cycles):
-                        total += cost_of(top * scales[s] * ranges[c], own_knots, own_lines)
-                    closed[b, j, s] = total if part_of == 0 else closed[b, j, s] + total
-                if part_of == 0:
-                    depth, cycles = finish(stack, depth, ranges, means)
+            for s in range(scales.size):
+                closed[b, j, s] = cycles_damage(ranges, cycles, stress * scales[s], *curve)
+            depth, cycles = finish(stack, depth, ranges, means)
             low, end = trimmed(stack, depth)
             for s in range(scales.size):
-                outer, inner = 0.0, 0.0
-                for c in range(depth - 1):
-                    half = 0.5 * cost_of(
-                        top * scales[s] * abs(stack[c + 1] - stack[c]), own_knots, own_lines
-                    )
-                    if low <= c < end - 1:
-                        inner += half
-                    else:
-                        outer += half
-                closed[b, j, s] += outer
-                alone[b, j, s] = closed[b, j, s] + inner
+                load = stress * scales[s]
+                closed[b, j, s] += cycles_damage(ranges, cycles, load, *curve)
+                closed[b, j, s] += residue_damage(stack, 0, low + 1, load, *curve)
+                closed[b, j, s] += residue_damage(stack, end - 1, depth, load, *curve)
+                alone[b, j, s] = closed[b, j, s] + residue_damage(stack, low, end, load, *curve)
             for c in range(low, end):
                 residue[b, j, c - low] = stress * stack[c]
             kept[b, j] = end - low

@@ -35,6 +35,41 @@ def cost_of(amplitude: float, knots: FloatArray, lines: FloatArray) -> float:
 
 
 @njit(cache=True, error_model="numpy")
+def cycles_damage(ranges, count, factor, knots, lines):  # type: ignore[no-untyped-def]
+    """Miner's sum of closed cycles.
+
+    Args:
+        ranges: (r,) any unit.
+        count: how many of them are in use.
+        factor: Pa per that unit.
+        knots: see `cost_of`.
+        lines: see `cost_of`.
+    """
+    total = 0.0
+    for c in range(count):
+        total += cost_of(0.5 * factor * ranges[c], knots, lines)
+    return total
+
+
+@njit(cache=True, error_model="numpy")
+def residue_damage(stack, first, end, factor, knots, lines):  # type: ignore[no-untyped-def]
+    """Miner's sum of a part of a residue, its ranges as half cycles.
+
+    Args:
+        stack: (r,) turning points, any unit.
+        first: of the part.
+        end: the one after its last.
+        factor: Pa per that unit.
+        knots: see `cost_of`.
+        lines: see `cost_of`.
+    """
+    total = 0.0
+    for c in range(first, end - 1):
+        total += 0.5 * cost_of(0.5 * factor * abs(stack[c + 1] - stack[c]), knots, lines)
+    return total
+
+
+@njit(cache=True, error_model="numpy")
 def history_damage(turns, factor, knots, lines, stack, ranges, means):  # type: ignore[no-untyped-def]
     """Miner's sum of a history: closed cycles whole, the residue as half cycles.
 
@@ -47,16 +82,11 @@ def history_damage(turns, factor, knots, lines, stack, ranges, means):  # type: 
         ranges: at least (t // 2 + 1,), scratch.
         means: likewise.
     """
-    total = 0.0
     depth, closed = push(turns, stack, 0, ranges, means)
-    for c in range(closed):
-        total += cost_of(0.5 * factor * ranges[c], knots, lines)
+    total = cycles_damage(ranges, closed, factor, knots, lines)
     depth, closed = finish(stack, depth, ranges, means)
-    for c in range(closed):
-        total += cost_of(0.5 * factor * ranges[c], knots, lines)
-    for c in range(depth - 1):
-        total += 0.5 * cost_of(0.5 * factor * abs(stack[c + 1] - stack[c]), knots, lines)
-    return total
+    total += cycles_damage(ranges, closed, factor, knots, lines)
+    return total + residue_damage(stack, 0, depth, factor, knots, lines)
 
 
 @njit(cache=True, error_model="numpy")
