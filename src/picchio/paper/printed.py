@@ -173,6 +173,15 @@ class Input(StrictModel):
             return float(self.low * (self.high / self.low) ** share)
         return float(self.low + share * (self.high - self.low))
 
+    def range_of(self, name: str) -> str:
+        """The range or the choices, in words.
+
+        Args:
+            name: of the input.
+        """
+        tried = ", ".join(map(str, self.choices)) or f"{self.low:.4g} to {self.high:.4g}"
+        return f"{name.replace('_', ' ')}: {tried} {self.unit}".rstrip(" –")
+
 
 class Test(StrictModel):
     """How a claim is tried: the number that decides, between two limits or equal to a third.

@@ -15,7 +15,7 @@ from picchio.core.provenance import provenance
 from picchio.core.results import TableResult
 from picchio.paper.claims import Finding, Verdict, try_claims
 from picchio.paper.equations import equations
-from picchio.paper.figures import PaperFigure, all_figures
+from picchio.paper.figures import PaperFigure, all_figures, number
 from picchio.paper.printed import paper_file, trials
 from picchio.paper.study import WORLDS, Study
 from picchio.paper.table2.by_arm import FREE
@@ -175,11 +175,10 @@ def conflicts(figures: Mapping[str, PaperFigure]) -> tuple[Conflict, ...]:
     """What does not fit together, by the numbers of the figures that show it."""
     found = []
     for name, entry in trials().conflicts.items():
-        words = figures[entry["figure"]].words
-        key, _, index = entry["number"].partition(".")
-        number = float(words[key][int(index)] if index else words[key])
+        words = {**figures[entry["figure"]].words, **figures[entry["figure"]].data}
         says, but = entry["says"].format(**words), entry["but"].format(**words)
-        found.append(Conflict(name, says, but, number, entry["figure"]))
+        decides = float(number(words, entry["number"]))
+        found.append(Conflict(name, says, but, decides, entry["figure"]))
     return tuple(found)
 
 
