@@ -144,27 +144,14 @@ def best_split(
         levels = np.unique(values)
         for at in 0.5 * (levels[1:] + levels[:-1]):
             level = f"{at:.3g} {entry.unit}".rstrip(" –")
-            splits.append((f"{name} is below {level}", values < at))
-            splits.append((f"{name} is above {level}", values > at))
-    best = ("", 0.0)
-    for words, chosen in splits:
-        right = 0.5 * (chosen[true].mean() + (~chosen[~true]).mean())
-        if right > best[1] + 1e-12:
-            best = (words, float(right))
-    return best
+            splits += [(f"{name} is below {level}", values < at)]
+            splits += [(f"{name} is above {level}", values > at)]
+    right = [0.5 * (chosen[true].mean() + (~chosen[~true]).mean()) for _, chosen in splits]
+    best = int(np.argmax(np.round(right, 12)))
+    return splits[best][0], float(right[best])
 
 
 # The numbers, by claim. Of a world: ------------------------------------------------------------
-
-
-def _poses(world: World) -> float:
-    stress = world.rivet_stress
-    return float((1.0 - stress.min(axis=1) / stress.max(axis=1).clip(1e-12))[:, 1:].max())
-
-
-def _no_joint_always(world: World) -> float:
-    joints = (world.rivet_stress, world.path_peaks.peak_deflection)
-    return len(np.union1d(*(each.argmax(axis=-1) for each in joints)))
 
 
 def _fluctuates(world: World) -> float:
@@ -184,28 +171,9 @@ def _transient(world: World) -> float:
     return float((world.stress(burst.max(axis=(0, 1))) / steady.max(axis=(0, 1))).max())
 
 
-def _dominant(k: int, world: World) -> float:
-    return float(world.path_peaks.peak_deflection[k].argmax()) + 1
-
-
-def _x_force(world: World) -> float:
-    peaks = world.reach.peaks
-    return float(peaks["x"][..., 0].max() / peaks["worst"][..., 0].max())
-
-
-def _off_y(world: World) -> float:
-    across_plane = np.abs(world.path_peaks.direction[:, 0, 1]).min()
-    return float(np.degrees(np.arccos(np.clip(across_plane, 0.0, 1.0))))
-
-
 def _middle(world: World) -> float:
     bend = int(world.reach.peaks["worst"][..., 2].max(axis=0).argmax())
     return float(world.reach.distance[0, bend] / world.reach.distance.max())
-
-
-def _nearest(world: World) -> float:
-    bent = world.reach.peaks["worst"][:, -1]
-    return float(np.median(bent[:, 2] / bent[:, 1]))
 
 
 def _most_stressed(world: World) -> float:
@@ -213,11 +181,41 @@ def _most_stressed(world: World) -> float:
     return float((means.argmax(axis=1) == world.printed.stress.argmax(axis=1)).sum())
 
 
+def _no_joint_always(world: World) -> float:
+    joints = (world.rivet_stress, world.path_peaks.peak_deflection)
+    return len(np.union1d(*(each.argmax(axis=-1) for each in joints)))
+
+
 def _spread(peaks: Any, axis: int) -> Any:
     """Largest over smallest, where the smallest may be nothing."""
     return peaks.max(axis=axis) / np.maximum(peaks.min(axis=axis), 1e-12)
 
 
+def _dominant(k: int, world: World) -> float:
+    return float(world.path_peaks.peak_deflection[k].argmax()) + 1
+
+
+def _off_y(world: World) -> float:
+    across_plane = np.abs(world.path_peaks.direction[:, 0, 1]).min()
+    return float(np.degrees(np.arccos(np.clip(across_plane, 0.0, 1.0))))
+
+
+def _x_force(world: World) -> float:
+    peaks = world.reach.peaks
+    return float(peaks["x"][..., 0].max() / peaks["worst"][..., 0].max())
+
+
+def _nearest(world: World) -> float:
+    bent = world.reach.peaks["worst"][:, -1]
+    return float(np.median(bent[:, 2] / bent[:, 1]))
+
+
+def _poses(world: World) -> float:
+    stress = world.rivet_stress
+    return float((1.0 - stress.min(axis=1) / stress.max(axis=1).clip(1e-12))[:, 1:].max())
+
+
+_HEIGHTS = ("top", "second", "third", "low")
 OF_WORLD: dict[str, Callable[[World], Any]] = {
     "poses": _poses,
     "no_joint_always": _no_joint_always,
@@ -228,10 +226,7 @@ OF_WORLD: dict[str, Callable[[World], Any]] = {
     "double_ball": lambda w: w.waist.max(),
     "symmetric": _symmetric,
     "envelope_size": lambda w: _spread(w.path_peaks.peak_deflection, 0).max(),
-    "dominant_top": partial(_dominant, 0),
-    "dominant_second": partial(_dominant, 1),
-    "dominant_third": partial(_dominant, 2),
-    "dominant_low": partial(_dominant, 3),
+    **{f"dominant_{at}": partial(_dominant, k) for k, at in enumerate(_HEIGHTS)},
     "direction_joint_1": _off_y,
     "direction_swings": lambda w: (np.sign(w.lean[0, 1:]) != np.sign(w.lean[-1, 1:])).sum(),
     "reach_joint_1": lambda w: abs(w.reach.top("worst", 0)[0]) / w.reach.place[..., 0].max(),

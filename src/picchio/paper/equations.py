@@ -43,23 +43,18 @@ def printed_response(
 
     The phase is by a plain arctangent, as written, or else by one of the full circle.
     """
-    terms = printed_series(blows, _HARMONICS)
-    j = np.arange(1, _HARMONICS + 1)
-    a, b = terms[1:].real, -terms[1:].imag
-    wave = 2.0 * np.pi / blows.period
-    found = np.empty((len(omega), len(time)))
-    for i, own in enumerate(omega):
-        r, stiffness = j * wave / own, own**2
-        size = np.hypot(a, b) / stiffness / np.sqrt((1.0 - r**2) ** 2 + (2.0 * ratio * r) ** 2)
-        if plain:
-            with np.errstate(divide="ignore", invalid="ignore"):
-                phase = np.arctan(2.0 * ratio * r / (1.0 - r**2)) + np.arctan(b / a)
-            phase = np.nan_to_num(phase)
-        else:
-            phase = np.arctan2(2.0 * ratio * r, 1.0 - r**2) + np.arctan2(b, a)
-        angle = np.outer(j * wave, time) - phase[:, None]
-        found[i] = terms[0].real / stiffness + size @ np.cos(angle)
-    return found
+    terms, j = printed_series(blows, _HARMONICS), np.arange(1, _HARMONICS + 1)
+    a, b, wave = terms[1:].real, -terms[1:].imag, j * (2.0 * np.pi / blows.period)
+    r = wave / omega[:, None]
+    damped, stiffness = 2.0 * ratio * r, omega**2
+    size = np.hypot(a, b) / stiffness[:, None] / np.sqrt((1.0 - r**2) ** 2 + damped**2)
+    phase = np.arctan2(damped, 1.0 - r**2) + np.arctan2(b, a)
+    if plain:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            phase = np.nan_to_num(np.arctan(damped / (1.0 - r**2)) + np.arctan(b / a))
+    angle = np.outer(wave, time)
+    each = zip(stiffness, size, phase, strict=True)
+    return np.array([terms[0].real / k + s @ np.cos(angle - p[:, None]) for k, s, p in each])
 
 
 def check_phase(world: World) -> dict[str, Any]:
@@ -69,29 +64,18 @@ def check_phase(world: World) -> dict[str, Any]:
     both peaks, and of the plain history.
     """
     at, n, joint = world.at_worst
-    modes = at.modes
-    time = np.linspace(0.0, world.blows.period, 400, endpoint=False)
-    exact = 1e3 * at.response(world.blows, None).deflection(time, n)[joint]
+    modes, time = at.modes, np.linspace(0.0, world.blows.period, 400, endpoint=False)
     push = modes.mode_shapes[joint] * (modes.mode_shapes.T @ (at.linear.input_matrix @ n))
-    omega, ratio = 2.0 * np.pi * modes.natural_frequencies, world.given.damping_ratio
-    plain, right = (
-        1e3 * (push @ printed_response(omega, ratio, world.blows, time, plain=as_written))
-        for as_written in (True, False)
-    )
-    peak = np.abs(exact).max()
+    own = (2.0 * np.pi * modes.natural_frequencies, world.given.damping_ratio, world.blows, time)
+    found = {"exact": 1e3 * at.response(world.blows, None).deflection(time, n)[joint]}
+    for name in ("plain", "right"):
+        found[name] = 1e3 * (push @ printed_response(*own, plain=name == "plain"))
+    peaks = {name: np.abs(values).max() for name, values in found.items()}
     errors = {
-        f"{name}_error": abs(float(np.abs(ours).max() / peak) - 1.0)
-        for name, ours in (("plain", plain), ("right", right))
+        f"{name}_error": abs(float(peak / peaks["exact"]) - 1.0) for name, peak in peaks.items()
     }
-    return {
-        "time": time,
-        "exact": exact,
-        "plain": plain,
-        "right": right,
-        "joint": joint + 1,
-        "plain_history": float(np.abs(plain - exact).max() / peak),
-        **errors,
-    }
+    history = float(np.abs(found["plain"] - found["exact"]).max() / peaks["exact"])
+    return {"time": time, **found, "joint": joint + 1, "plain_history": history, **errors}
 
 
 def miner_gap(printed: Printed) -> float:
@@ -115,23 +99,20 @@ def printed_total(printed: Printed) -> tuple[float, int]:
 
 def _energy(study: Study) -> float:
     """Eq. 1: the tool's kinetic energy by links and by M, for random rates."""
-    world, arm, step = study.base, study.printed.arm, 1e-5
+    robot, arm, step = study.base.robot, study.printed.arm, 1e-5
     rng, worst = np.random.default_rng(0), 0.0
     for _ in range(5):
         pose, rate = rng.uniform(-1.0, 1.0, 3), rng.normal(size=3)
-        total = 0.0
-        for i, mass in enumerate(arm.masses):
-            (p0, r0), (_, frame), (p1, r1) = (
-                world.robot.frame_placement(pose + s * step * rate, f"link_{i + 1}")
-                for s in (-1.0, 0.0, 1.0)
-            )
-            centre = np.array(arm.centres_of_gravity[i])
+        near, total = [pose + s * step * rate for s in (-1.0, 0.0, 1.0)], 0.0
+        for i, (mass, centre) in enumerate(zip(arm.masses, arm.centres_of_gravity, strict=True)):
+            places = [robot.frame_placement(each, f"link_{i + 1}") for each in near]
+            (p0, r0), (_, frame), (p1, r1) = places
             speed = ((p1 + r1 @ centre) - (p0 + r0 @ centre)) / (2.0 * step)
             turn = (r1 - r0) / (2.0 * step) @ (0.5 * (r0 + r1)).T
             spin = frame.T @ np.array([turn[2, 1], turn[0, 2], turn[1, 0]])
             inertia = arm.inertia(i, study.given.inertia_about)
             total += float(0.5 * mass * speed @ speed + 0.5 * inertia @ spin**2)
-        exact = float(0.5 * rate @ world.robot.state(pose).mass_matrix @ rate)
+        exact = float(0.5 * rate @ robot.state(pose).mass_matrix @ rate)
         worst = max(worst, abs(total / exact - 1.0))
     return worst
 
@@ -178,15 +159,12 @@ def _modes(study: Study) -> float:
 
 def decoupling(study: Study) -> float:
     """Off-diagonal over diagonal of S'MS, S'KS and S'CS, the largest at the rivets."""
-    worst = 0.0
-    for pose in study.base.rivet_poses:
-        system = study.base.model.linear_system(pose)
-        _, shapes = undamped_modes(system.mass_matrix, system.stiffness_matrix)
-        for matrix in (system.mass_matrix, system.stiffness_matrix, system.damping_matrix):
-            modal = shapes.T @ matrix @ shapes
-            off = np.abs(modal - np.diag(modal.diagonal())).max()
-            worst = max(worst, float(off / np.abs(modal.diagonal()).max()))
-    return worst
+    systems = [study.base.model.linear_system(pose) for pose in study.base.rivet_poses]
+    matrices = np.array([(s.mass_matrix, s.stiffness_matrix, s.damping_matrix) for s in systems])
+    shapes = np.array([undamped_modes(mass, stiff)[1] for mass, stiff, _ in matrices])[:, None]
+    modal = np.abs(shapes.swapaxes(-1, -2) @ matrices @ shapes)
+    off = np.where(np.eye(modal.shape[-1]), 0.0, modal).max(axis=(-1, -2))
+    return float((off / modal.diagonal(axis1=-2, axis2=-1).max(axis=-1)).max())
 
 
 def series_gap(study: Study) -> float:
@@ -226,13 +204,6 @@ def equations(study: Study) -> list[dict[str, Any]]:
     found = []
     for number, remark in study.printed.equations.items():
         done = trials().equations.get(number, nothing)
-        found.append(
-            {
-                "number": number,
-                "page": remark.page,
-                "says": remark.says,
-                **done,
-                "gap": gaps.get(done["gap"]),
-            }
-        )
+        said = {"number": number, "page": remark.page, "says": remark.says}
+        found.append({**said, **done, "gap": gaps.get(done["gap"])})
     return found
