@@ -109,7 +109,6 @@ class Fit:
         reduced: the system in what is shared.
         covariance: (n, n) of the shared numbers, in units of their prior.
         renewals: how often slopes were taken.
-        penalty: nats, the log of how many ways there are to choose what was tried, not fitted.
         grams: products of slopes and residual, in units of the prior.
     """
 
@@ -122,7 +121,6 @@ class Fit:
     reduced: Reduced
     covariance: FloatArray
     renewals: int
-    penalty: float = 0.0
     grams: list[FloatArray] = field(repr=False, default_factory=list)
 
     @property
@@ -266,7 +264,6 @@ def estimate(
     likelihood: Likelihood,
     start: Numbers,
     *,
-    linear: Any = None,
     renewals: int = 12,
     steps: int = 30,
     tolerance: float = 0.05,
@@ -276,7 +273,6 @@ def estimate(
     Args:
         likelihood: of the records under a hypothesis.
         start: where to begin.
-        linear: slopes near there, if they are known.
         renewals: how often slopes may be taken.
         steps: at most.
         tolerance: nats by which a step must gain.
@@ -288,7 +284,7 @@ def estimate(
     at = Numbers(np.clip(start.shared, prior.low, prior.high), start.groups, start.records)
     residuals = likelihood.residuals(at)
     now = objective(likelihood, at, squares_of(residuals))
-    used, fresh = 0, False
+    used, fresh, linear = 0, False, None
     for _ in range(steps):
         if linear is None:
             if used >= renewals:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -20,7 +21,7 @@ from picchio.diagnosis.percussion.data.problem import (
     residual,
 )
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis as Old
-from picchio.diagnosis.percussion.likelihood.causes import Cause, EffectNumber, cause_of
+from picchio.diagnosis.percussion.likelihood.factor import FACTOR, Factor
 from picchio.diagnosis.percussion.tolerance.nudges import Inexact, inexact, nudged
 from picchio.model.effects.effect import Effect
 from picchio.model.model import Model
@@ -37,7 +38,7 @@ class Data:
 
     Attributes:
         problem: robot, records, noise.
-        base: the fitted values of the files: stiffness, damping, force.
+        base: factors on what the files state: stiffness, damping, force.
         shared: numbers of the campaign.
         groups: of a pose, as its first record has them.
         own: of each record, with the blow that each belongs to, or -1.
@@ -46,7 +47,7 @@ class Data:
     """
 
     problem: Problem
-    base: tuple[Cause, ...]
+    base: tuple[Factor, ...]
     shared: tuple[Inexact, ...]
     groups: tuple[tuple[Inexact, ...], ...]
     own: tuple[tuple[tuple[Inexact, int], ...], ...]
@@ -66,11 +67,8 @@ class Data:
             sigma = old.known.sigma(effect.label)
             if sigma is None:
                 sigma = float(getattr(tolerance, effect.tolerance))
-            cause = cause_of(effect, [], tolerance)
-            if effect.name not in sought:
-                numbers = tuple(replace(n, std=max(sigma, 1e-6)) for n in cause.numbers)
-                cause = replace(cause, numbers=numbers)
-            base.append(cause)
+            sigma = math.hypot(FACTOR, sigma) if effect.name in sought else max(sigma, 1e-6)
+            base.append(Factor(effect, sigma))
         lists = [inexact(problem, r, tolerance, measured=False) for r in problem.records]
         shared: dict[str, Inexact] = {}
         groups: dict[int, tuple[Inexact, ...]] = {}
@@ -127,72 +125,24 @@ class Data:
 
 
 @dataclass(frozen=True, eq=False)
-class Drawn:
-    """A number that an effect draws anew in every record, or for every blow of one.
-
-    Attributes:
-        cause: whose number it is.
-        size: its standard deviation beforehand, SI.
-        later: whether it is by how much a blow comes late.
-    """
-
-    cause: Cause
-    size: float
-    later: bool
-    means: str = ""
-    name: str = ""
-
-
-Own = tuple[Inexact | Drawn, int]
-
-
-@dataclass(frozen=True, eq=False)
 class Percussion:
     """The records under a hypothesis, up to a time.
 
     Attributes:
         data: records and numbers.
-        causes: of the hypothesis.
         end: s; None for all.
         edges: where samples near a jump are left out: (record) -> masks.
     """
 
     data: Data
-    causes: tuple[Cause, ...] = ()
     end: float | None = None
     edges: tuple[dict[str, BoolArray] | None, ...] = ()
     light: bool = False
 
     def __post_init__(self) -> None:
         if not self.edges:
-            object.__setattr__(
-                self,
-                "edges",
-                self._edges([c.effect for c in self._base()] + [c.effect for c in self.causes]),
-            )
-
-    def _base(self) -> list[Cause]:
-        return [c for c in self.data.base if c.label not in self._labels]
-
-    @cached_property
-    def _labels(self) -> frozenset[str]:
-        return frozenset(c.label for c in self.causes)
-
-    def own(self, k: int) -> list[Own]:
-        """A record's own numbers, each with the blow or the place that it belongs to, or -1.
-
-        Args:
-            k: which record.
-        """
-        found: list[Own] = [o for o in self.data.own[k] if o[0].means not in self._labels]
-        for cause in self.causes:
-            latent = cause.effect.latent
-            if latent is None or latent.whole:
-                continue
-            hits = np.unique(self.data.records[k].setup.blows.hit).size
-            one = Drawn(cause, cause.effect.values[latent.spread], latent.times)
-            found += [(one, i) for i in range(latent.first, latent.size(hits))]
-        return found
+            edges = self._edges([c.effect for c in self.data.base])
+            object.__setattr__(self, "edges", edges)
 
     def _edges(self, effects: Sequence[Effect]) -> tuple[dict[str, BoolArray] | None, ...]:
         model = self.data.problem.model.with_effects(effects)
@@ -200,40 +150,22 @@ class Percussion:
 
     # Layout -----------------------------------------------------------------------------------
     @cached_property
-    def effect_numbers(self) -> list[tuple[Cause, EffectNumber]]:
-        """Of the shared numbers, first those of effects."""
-        return [(c, n) for c in (*self._base(), *self.causes) for n in c.numbers]
-
-    @cached_property
-    def inexact(self) -> list[Inexact]:
-        """Then what is never exact, but what a cause stands for."""
-        return [one for one in self.data.shared if one.means not in self._labels]
-
-    @cached_property
     def names(self) -> list[str]:
-        """Of the shared numbers."""
-        return [f"{c.label}.{n.parameter}" for c, n in self.effect_numbers] + [
-            o.name for o in self.inexact
-        ]
+        """Of the shared numbers: first the factors, then what is never exact."""
+        return [each.label for each in self.data.base] + [each.name for each in self.data.shared]
 
     @cached_property
     def prior(self) -> Prior:
         """Of all numbers."""
-        numbers = [n for _, n in self.effect_numbers]
-        k = len(self.inexact)
+        base, shared = self.data.base, self.data.shared
         tiny = 1e-6 if self.light else 1.0
-        std = np.array([n.std for n in numbers] + [tiny] * k)
-        mean = np.array([n.mean for n in numbers] + [0.0] * k)
-        low = np.array(
-            [n.low for n in numbers]
-            + [0.0 if o.one_way and not o.each_blow else -np.inf for o in self.inexact]
-        )
-        high = np.array([n.high for n in numbers] + [np.inf] * k)
+        std = np.array([each.std for each in base] + [tiny] * len(shared))
+        mean = np.zeros(std.size)
+        one_way = [0.0 if o.one_way and not o.each_blow else -np.inf for o in shared]
+        low = np.array([each.ends[0] for each in base] + one_way)
+        high = np.array([each.ends[1] for each in base] + [np.inf] * len(shared))
         groups = tuple(np.full(len(g), tiny) for g in self.data.groups)
-        records = tuple(
-            np.array([tiny if isinstance(o, Inexact) else o.size for o, _ in self.own(k)])
-            for k in range(len(self.data.records))
-        )
+        records = tuple(np.full(len(own), tiny) for own in self.data.own)
         zero = lambda parts: tuple(np.zeros(p.size) for p in parts)  # noqa: E731
         return Prior(
             Numbers(mean, zero(groups), zero(records)), Numbers(std, groups, records), low, high
@@ -262,7 +194,7 @@ class Percussion:
         return out
 
     def start(self, at: Numbers | None = None, like: Percussion | None = None) -> Numbers:
-        """Numbers to begin at: another hypothesis' where they are the same, causes as tried.
+        """Numbers to begin at: those of another where it has them, else as stated.
 
         Args:
             at: numbers of the other hypothesis; None for the stated ones.
@@ -271,66 +203,20 @@ class Percussion:
         known = {}
         if at is not None and like is not None:
             known = dict(zip(like.names, at.shared, strict=True))
-        first = []
-        for c, n in self.effect_numbers:
-            name = f"{c.label}.{n.parameter}"
-            default = c.coordinates(c.effect)[[m.parameter for m in c.numbers].index(n.parameter)]
-            first.append(known.get(name, default))
-        shared = np.array(first + [known.get(o.name, 0.0) for o in self.inexact])
+        shared = np.array([known.get(name, 0.0) for name in self.names])
         zero = self.prior.mean
         if at is None or like is None or like.data.chosen != self.data.chosen:
             return Numbers(shared, zero.groups, zero.records)
-        own = []
-        for k in range(len(self.data.records)):
-            had = {
-                (o.name if isinstance(o, Inexact) else o.cause.label, i): x
-                for (o, i), x in zip(like.own(k), at.records[k], strict=True)
-            }
-            own.append(
-                np.array(
-                    [
-                        had.get((o.name if isinstance(o, Inexact) else o.cause.label, i), 0.0)
-                        for o, i in self.own(k)
-                    ]
-                )
-            )
-        return Numbers(shared, at.groups, tuple(own))
+        return Numbers(shared, at.groups, at.records)
 
     # The model at a point ----------------------------------------------------------------------
     def effects_at(self, at: Numbers) -> tuple[Effect, ...]:
-        """Effects of the files' values and of the causes.
+        """Effects of the files' values.
 
         Args:
             at: the numbers.
-
-        Returns:
-            in the order of the causes.
         """
-        out, k = [], 0
-        for c in (*self._base(), *self.causes):
-            m = len(c.numbers)
-            effect = c.at(at.shared[k : k + m].tolist())
-            if effect.latent is not None and not effect.latent.whole:
-                effect = effect.with_hidden(self._hidden(c, at))
-            elif c.effect.hidden:
-                effect = effect.with_hidden(c.effect.hidden)
-            out.append(effect)
-            k += m
-        return tuple(out)
-
-    def _hidden(self, cause: Cause, at: Numbers) -> dict[str, tuple[float, ...]]:
-        """What a cause draws in every record."""
-        found = {}
-        latent = cause.effect.latent
-        assert latent is not None
-        for k, record in enumerate(self.data.records):
-            mine = [
-                x
-                for (o, _), x in zip(self.own(k), at.records[k], strict=True)
-                if isinstance(o, Drawn) and o.cause.label == cause.label
-            ]
-            found[record.name] = (*([0.0] * latent.first), *mine)
-        return found
+        return tuple(one.at(float(u)) for one, u in zip(self.data.base, at.shared, strict=False))
 
     def moved(self, record: int, at: Numbers) -> list[tuple[Inexact, FloatArray]]:
         """What is moved in a record, by how many standard deviations.
@@ -341,14 +227,12 @@ class Percussion:
         """
         if self.light:
             return []
-        k = len(self.effect_numbers)
+        k = len(self.data.base)
         pose = self.data.records[record].pose
-        out = [(o, at.shared[k + i : k + i + 1]) for i, o in enumerate(self.inexact)]
+        out = [(o, at.shared[k + i : k + i + 1]) for i, o in enumerate(self.data.shared)]
         out += [(o, at.groups[pose][i : i + 1]) for i, o in enumerate(self.data.groups[pose])]
         blows: dict[str, tuple[Inexact, FloatArray]] = {}
-        for (o, blow), x in zip(self.own(record), at.records[record], strict=True):
-            if isinstance(o, Drawn):
-                continue
+        for (o, blow), x in zip(self.data.own[record], at.records[record], strict=True):
             if blow < 0:
                 out.append((o, np.array([x])))
                 continue
@@ -408,27 +292,6 @@ class Percussion:
         if not np.isfinite(rows).all():
             raise InputError("no model that can be computed: the motion diverges")
         return rows
-
-    def some(self, at: Numbers) -> tuple[Percussion, Numbers]:
-        """One record a pose, each of another direction, and their numbers.
-
-        Args:
-            at: the numbers of all.
-        """
-        chosen = self.data.one_a_pose
-        data = self.data.only(chosen)
-        return (
-            replace(self, data=data, edges=()),
-            Numbers(at.shared, at.groups, tuple(at.records[k] for k in chosen)),
-        )
-
-    def about(self, at: Numbers) -> Percussion:
-        """The same with the samples left out that are near edges there.
-
-        Args:
-            at: the numbers.
-        """
-        return replace(self, edges=self._edges(self.effects_at(at)))
 
     def linearised(self, at: Numbers) -> Slopes:
         """The slopes there.

@@ -46,14 +46,6 @@ _STRUCTURAL = ("structure", "over-time")
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
-    """An effect at a share of its amount: its slope is per whole amount."""
-
-    effect: Effect
-    share: float
-
-
-@dataclass(frozen=True, eq=False)
 class Change:
     """By how much one number changes the equations of a pose's records, per unit of the number.
 
@@ -96,7 +88,7 @@ class Column:
 
     Attributes:
         kind: "change" of the equations; "force": direction and size; "sensor": how a group reads;
-            "strikes": blows that come and go; "models": two predictions; "line": a sine; "none".
+            "strikes": blows that come and go; "models": two predictions; "none".
         change: of the equations.
         direction: (3,) change of the blows' direction.
         louder: relative change of all blows.
@@ -106,7 +98,7 @@ class Column:
         size: how far these are apart.
     """
 
-    kind: Literal["change", "force", "sensor", "strikes", "models", "line", "none"]
+    kind: Literal["change", "force", "sensor", "strikes", "models", "none"]
     change: Change | None = None
     direction: FloatArray | None = None
     louder: float = 0.0
@@ -114,7 +106,6 @@ class Column:
     strikes: tuple[Strike, ...] = ()
     models: tuple[Model, Model] | None = None
     size: float = 1.0
-    line: tuple[Effect, int] | None = None
 
 
 _NONE = Column("none")
@@ -221,20 +212,19 @@ class Slopes:
         return [one.gram(rows) for one, rows in zip(self.records, residuals, strict=True)]
 
     @classmethod
-    def of(cls, of: Percussion, at: Numbers, candidates: Sequence[Candidate] = ()) -> Slopes:
-        """At a point; last among the shared numbers those of candidates.
+    def of(cls, of: Percussion, at: Numbers) -> Slopes:
+        """At a point.
 
         Args:
             of: the records under a hypothesis.
             at: the numbers.
-            candidates: effects that are not in it.
         """
         by_pose: dict[int, list[int]] = {}
         for k, pose in enumerate(of.group_of):
             by_pose.setdefault(pose, []).append(k)
         found: dict[int, RecordSlopes] = {}
         for records in by_pose.values():
-            found |= _Pose(of, at, records).slopes(candidates)
+            found |= _Pose(of, at, records).slopes()
         return cls(tuple(found[k] for k in range(len(of.group_of))))
 
 
@@ -428,65 +418,24 @@ class _Pose:
                         return False
         return True
 
-    def candidate(self, one: Candidate) -> list[Column]:
-        """By an effect that is not in the model."""
-        pairs = {k: (self.there[k][1], _under(self.there[k][1], one.effect)) for k in self.records}
-        first = pairs[self.records[0]]
-        try:
-            if one.effect.where in _STRUCTURAL and one.share < 0.5:
-                found = (
-                    self.structural(first[0], first[1], one.share, one.effect.where == "over-time")
-                    if not self.drifts and one.effect.where != "over-time"
-                    else [
-                        Column(
-                            "change",
-                            change=Change.between(
-                                self.system_of(b, k), self.system_of(a, k), one.share
-                            ),
-                        )
-                        for k, (b, a) in pairs.items()
-                    ]
-                )
-                if found is not None:
-                    return found
-            if one.effect.where == "blows" and one.share < 0.5:
-                return [self.blows(k, *pairs[k], one.share) for k in self.records]
-            if one.effect.where == "sensor" and self.plain(first):
-                return [self.sensor(first[0], first[1], one.share)] * len(self.records)
-        except (InputError, np.linalg.LinAlgError):
-            return [_NONE] * len(self.records)
-        return [Column("models", models=pairs[k], size=one.share) for k in self.records]
-
     # All together ----------------------------------------------------------------------------
 
-    def slopes(self, candidates: Sequence[Candidate]) -> dict[int, RecordSlopes]:
+    def slopes(self) -> dict[int, RecordSlopes]:
         """Of every record of the pose."""
         of, at, data = self.of, self.at, self.of.data
         tail: list[list[Column]] = []  # of each number: of each record
         tail += [self.inexact(one) for one in data.groups[of.group_of[self.records[0]]]]
-        place = 0
-        for cause, now in zip((*of._base(), *of.causes), self.base, strict=True):
-            u = at.shared[place : place + len(cause.numbers)]
-            for j, n in enumerate(cause.numbers):
-                step = max(1e-3 * n.std, 1e-2 * u[j]) if n.kind == "inverse" else 1e-3 * n.std
-                low, high = max(u[j] - step, n.low), min(u[j] + step, n.high)
-                ends = [cause.at([*u[:j], value, *u[j + 1 :]]) for value in (low, high)]
-                tail.append(self.effect(now, ends, high - low))
-            place += len(cause.numbers)
-        tail += [self.inexact(one) for one in of.inexact]
-        tail += [self.candidate(one) for one in candidates]
+        for u, factor, now in zip(at.shared, data.base, self.base, strict=False):
+            before, after = np.clip([u - 1e-3 * factor.std, u + 1e-3 * factor.std], *factor.ends)
+            ends = [factor.at(before), factor.at(after)]
+            tail.append(self.effect(now, ends, float(after - before)))
+        tail += [self.inexact(one) for one in data.shared]
         found = {}
         for i, k in enumerate(self.records):
             head: list[Column] = []
             blows: list[tuple[float, bool, int]] = []
-            for one, blow in of.own(k):
-                if not isinstance(one, Inexact):
-                    if one.later:
-                        head.append(Column("strikes", size=1.0))
-                        blows.append((1.0, True, blow))
-                    else:
-                        head.append(Column("line", line=(one.cause.effect, blow)))
-                elif of.light:
+            for one, blow in data.own[k]:
+                if of.light:
                     head.append(_NONE)
                 elif blow >= 0:
                     head.append(Column("strikes", size=1.0))
@@ -521,10 +470,10 @@ class _Record:
         setup, own, channels = self.setup, self.own, self.own.channels
         count = setup.samples.count
         weighed = [c for c in columns if c.kind in ("change", "force", "sensor", "none")]
-        listed = [c for c in columns if c.kind in ("strikes", "models", "line")]
+        listed = [c for c in columns if c.kind in ("strikes", "models")]
         places, a, b = [], 0, len(weighed)
         for c in columns:
-            if c.kind in ("strikes", "models", "line"):
+            if c.kind in ("strikes", "models"):
                 places.append(b)
                 b += 1
             else:
@@ -668,20 +617,6 @@ class _Record:
                     ]
                 for r, i in enumerate(rows):
                     explicit[e, i] = _whitened(values[r][None], noise[r], dead[r], free, unknown)[0]
-        for e, c in enumerate(listed):
-            if c.line is not None:
-                effect, place = c.line
-                phase = 2.0 * np.pi * effect.values["frequency"] * setup.samples.times
-                wave = np.sin(phase) if place else np.cos(phase)
-                for i in members.get(effect.target, []):
-                    model = own.noise[channels[i].name].model
-                    free = setup.steady or channels[i].kind.free_offset
-                    unknown = (
-                        edges[effect.target][:count]
-                        if edges is not None and channels[i].kind.jumps
-                        else None
-                    )
-                    explicit[e, i] = _whitened(wave[None], model, unknown, free, unknown)[0]
         now_left: FloatArray | None = None
         for e, c in enumerate(listed):
             if c.kind != "models" or c.models is None:

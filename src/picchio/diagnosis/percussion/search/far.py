@@ -148,11 +148,11 @@ def rough(data: Data) -> Rough | None:
     except FAILED as error:
         _log.debug("springs from nothing: %s", error)
         return None
-    n = len(stated.effect_numbers)
+    n = len(data.base)
     off = standardised(stated.prior, found.at).shared[n:]
     if off.size and off @ off > _STRAINED**2 * off.size:
         return None
-    by_name = {c.label: k for k, (c, _) in enumerate(stated.effect_numbers)}
+    by_name = {each.label: k for k, each in enumerate(data.base)}
     springs = [by_name[JointStiffness(name).label]
                for name in data.problem.robot.flexible_names]  # fmt: skip
     return Rough(

@@ -1,1 +1,0 @@
-"""Search among sets of causes, by their evidence."""
