@@ -106,24 +106,18 @@ class AutoRegression:
         Args:
             lags: the last one.
         """
-        rho = np.zeros(lags + 1)
-        rho[0] = 1.0
-        if not self.order:
-            return rho
-        left = 1.0
-        for k, a in enumerate(self.predictors[:-1]):
-            if k >= lags:
-                return rho
-            rho[k + 1] = a @ rho[1 : k + 1][::-1] + self.reflection[k] * left if k else (
-                self.reflection[0]
-            )  # fmt: skip
-            left *= 1.0 - self.reflection[k] ** 2
-        p, last = self.order, self.predictors[-1][::-1]
-        for i in range(p + 1, lags + 1):
-            rho[i] = last @ rho[i - p : i]
-            if i % 64 == 0 and np.abs(rho[i - 63 : i + 1]).max() < 1e-9:
-                break
-        return rho
+        from scipy.signal import lfilter, lfiltic
+
+        rho, left = np.ones(1), np.cumprod(np.append(1.0, 1.0 - self.reflection**2))
+        for k, (a, reflection) in enumerate(zip(self.predictors, self.reflection, strict=False)):
+            rho = np.append(rho, a @ rho[:0:-1] + reflection * left[k])
+        last = np.append(1.0, -self.predictors[-1])
+        more = max(lags - self.order, 0)
+        if more and self.order:
+            rest = lfilter([1.0], last, np.zeros(more), zi=lfiltic([1.0], last, rho[:0:-1]))[0]
+        else:
+            rest = np.zeros(more)
+        return np.append(rho, rest)[: lags + 1]
 
 
 def fit_autoregression(

@@ -49,12 +49,11 @@ class NoiseCollector:
     def __init__(self, campaign: Campaign) -> None:
         self.units: dict[str, str] = {}
         self.periods: dict[str, tuple[float, float]] = {}
-        self._pieces: dict[tuple[str, int], dict[str, list[Piece]]] = defaultdict(
+        self._pieces: dict[tuple[str, float], dict[str, list[Piece]]] = defaultdict(
             lambda: defaultdict(list)
         )
-        self._rates: dict[int, float] = {}
+        self._rates: list[float] = []
         self._resolution: dict[str, float] = {}
-        self._range: dict[str, float] = {}
         self._repeats = Repeats(campaign)
 
     def add(self, window: Window) -> None:
@@ -76,12 +75,10 @@ class NoiseCollector:
         elif not window.steady and self._poor(window, rate):
             self._put(rate, ring_down_pieces(window))
 
-    def _rate(self, rate: float) -> int:
-        for key, known in self._rates.items():
-            if abs(known / rate - 1.0) < 1e-3:
-                return key
-        self._rates[len(self._rates)] = rate
-        return len(self._rates) - 1
+    def _rate(self, rate: float) -> float:
+        """The first rate that was as good as the same."""
+        self._rates.append(rate)
+        return next(known for known in self._rates if abs(known / rate - 1.0) < 1e-3)
 
     def _note_resolution(self, name: str, values: FloatArray) -> None:
         steps = np.abs(np.diff(values))
@@ -96,17 +93,16 @@ class NoiseCollector:
             least = 0.0
         self._resolution[name] = min(self._resolution.get(name, np.inf), least)
 
-    def _put(self, rate: int, pieces: Iterable[tuple[str, Piece]]) -> None:
+    def _put(self, rate: float, pieces: Iterable[tuple[str, Piece]]) -> None:
         for name, piece in pieces:
             kept = self._pieces[name, rate][piece.method]
             if sum(p.samples for p in kept) < _ENOUGH:
                 m = min(piece.values.size, _ENOUGH)
                 share = m / piece.values.size
-                short = piece.time[:m].copy(), piece.values[:m].copy()
-                kept.append(replace(piece, time=short[0], values=short[1],
-                                    samples=piece.samples * share))  # fmt: skip
+                time, values = piece.time[:m].copy(), piece.values[:m].copy()
+                kept.append(replace(piece, time=time, values=values, samples=piece.samples * share))
 
-    def _poor(self, window: Window, rate: int) -> bool:
+    def _poor(self, window: Window, rate: float) -> bool:
         """Whether some channel of this record still has too little noise for an estimate."""
         return any(
             sum(p.samples for pieces in self._pieces[name, rate].values() for p in pieces)
@@ -118,32 +114,31 @@ class NoiseCollector:
         """The estimates."""
         found: dict[str, list[Noise]] = defaultdict(list)
         for (name, rate), by_method in self._pieces.items():
-            noise = self._estimate(name, self._rates[rate], by_method)
+            noise = self._estimate(name, rate, by_method)
             if noise is not None:
                 found[name].append(noise)
-        result = {}
-        for name in self.units:
-            ranked = sorted(found.get(name, []), key=lambda noise: noise.error)
-            if ranked:
-                result[name] = replace(ranked[0], others={n.rate: n for n in ranked[1:]})
-        return result
+        ranked = {name: sorted(found[name], key=lambda n: n.error) for name in self.units}
+        return {
+            name: replace(best[0], others={n.rate: n for n in best[1:]})
+            for name, best in ranked.items()
+            if best
+        }
 
     def _estimate(self, name: str, rate: float, by_method: dict[str, list[Piece]]) -> Noise | None:
         sources: list[NoiseSource] = []
         chosen: list[Piece] = []
         lines: tuple[Line, ...] = ()
         resolution = self._resolution.get(name, 0.0)
-        resolution = resolution if np.isfinite(resolution) else 0.0
         for method in METHODS:
             if not by_method.get(method):
                 continue
             # In repeats the blows' own harmonics differ, and may lie at the mains' frequency.
             seek = method != "fast changes" and (method != "repeats" or not chosen)
-            pieces, hum = take_out_hum(by_method[method], rate) if seek else (
-                by_method[method], ())  # fmt: skip
-            model = _model(pieces)
-            lines = lines or hum
-            self._weigh(method, pieces, model, sources, chosen)
+            pieces = by_method[method]
+            if seek:
+                pieces, hum = take_out_hum(pieces, rate)
+                lines = lines or hum
+            self._weigh(method, pieces, _model(pieces), sources, chosen)
         if not chosen:
             return None
         used = [source for source in sources if source.used]

@@ -55,16 +55,16 @@ def quiet_pieces(window: Window) -> Iterator[tuple[str, Piece]]:
     for name, values in window.arrays.items():
         part = values[before]
         if part.size >= _FEWEST:
-            yield name, _without_mean("quiet", window, before, part)
+            yield name, _without_mean("quiet", window.record.file, window.time[before], part)
         end = _rung_down(values[after])
         if end is not None:
             where = slice(after.start + end, after.stop)
-            yield name, _without_mean("rung down", window, where, values[where])
+            yield name, _without_mean("rung down", window.record.file, window.time[where],
+                                      values[where])  # fmt: skip
 
 
-def _without_mean(method: str, window: Window, where: slice, part: FloatArray) -> Piece:
-    return Piece(method, window.record.file, window.time[where], part - part.mean(),
-                 part.size - 1, mean_removed=True)  # fmt: skip
+def _without_mean(method: str, record: str, time: FloatArray, part: FloatArray) -> Piece:
+    return Piece(method, record, time, part - part.mean(), part.size - 1, mean_removed=True)
 
 
 def _rung_down(values: FloatArray) -> int | None:
@@ -180,9 +180,8 @@ def repeat_pieces(one: Window, other: Window) -> Iterator[tuple[str, Piece]]:
         return
     for name in (name for name in one.arrays if name in other.arrays):
         difference = (other.arrays[name][b] - one.arrays[name][a]) / np.sqrt(2.0)
-        yield name, Piece("repeats", f"{one.record.file}, {other.record.file}", time,
-                          difference - difference.mean(), time.size - 1,
-                          mean_removed=True)  # fmt: skip
+        yield name, _without_mean("repeats", f"{one.record.file}, {other.record.file}", time,
+                                  difference)  # fmt: skip
 
 
 def fast_pieces(window: Window) -> Iterator[tuple[str, Piece]]:

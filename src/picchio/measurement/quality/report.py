@@ -73,13 +73,10 @@ def summarise(scan: RecordScan) -> RecordSummary:
     record, clock = scan.record, scan.clock
     motion = record.kind == "motion"
     blows = scan.window.blows
-    words = None
-    if not motion:
-        if record.reads_force:
-            words = "the force was recorded"
-        else:
-            words = blows.describe() if blows is not None else "not stated"
-            words += ", steady" if record.steady else f", {record.hits} blows"
+    words = blows.describe() if blows is not None else "not stated"
+    words += ", steady" if record.steady else f", {record.hits} blows"
+    if record.reads_force:
+        words = "the force was recorded"
     direction = record.direction
     return RecordSummary(
         record.file,
@@ -91,16 +88,12 @@ def summarise(scan: RecordScan) -> RecordSummary:
         record.pose,
         None if direction is None else direction.tolist(),
         {} if motion else record.excitation.model_dump(exclude_none=True),
-        words,
+        None if motion else words,
         record.taken.isoformat() if record.taken is not None else None,
         record.temperature,
         {
-            name: {
-                "unit": record.channel(name).unit,
-                "rms": seen.rms,
-                "least": seen.least,
-                "most": seen.most,
-            }
+            name: {"unit": record.channel(name).unit}
+            | {word: getattr(seen, word) for word in ("rms", "least", "most")}
             for name, seen in scan.channels.items()
         },
     )

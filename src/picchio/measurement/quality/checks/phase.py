@@ -82,17 +82,12 @@ class PhaseCheck(Check):
             group = window.channels[name].group
             for k, s in enumerate(poles):
                 seen, strength = waves[name][k], abs(waves[name][k])
-                if strength < 8.0 * error[name][k] or abs(expected[k]) < 0.1 * strength:
-                    continue
-                if s.imag < 2.0 * np.pi or abs(expected[k]) > 10.0 * strength:
-                    continue
-                if -s.real > 0.3 * s.imag:
-                    continue
-                phase = float(np.angle(seen / expected[k]))
                 weight = strength / error[name][k]
-                self._points[group, by_robot].append(
-                    (float(s.imag), phase, float(min(weight, 200.0)))
-                )
+                alike = 0.1 * strength <= abs(expected[k]) <= 10.0 * strength
+                if weight < 8.0 or not alike or -s.real > 0.3 * s.imag or s.imag < 2.0 * np.pi:
+                    continue
+                phase = np.angle(seen / expected[k])
+                self._points[group, by_robot].append((s.imag, phase, min(weight, 200.0)))
 
     def _keep_vectors(self, waves: _Waves, error: dict[str, FloatArray], must: _Waves) -> None:
         groups = dict.fromkeys(name.rpartition(".")[0] for name in must)
@@ -238,7 +233,5 @@ def _fit(points: FloatArray) -> tuple[float, float, float, float] | None:
     error = spread * np.sqrt(3.0 * np.median(weight) * np.diag(np.linalg.inv(normal)))
     if spread > 0.15:
         return None
-    corner = float(found.x[0]) * 30.0 / (2.0 * np.pi)
-    return corner, float(error[0]) * 30.0 / (2.0 * np.pi), float(found.x[1]) * 1e-2, (
-        float(error[1]) * 1e-2
-    )  # fmt: skip
+    corner, delay = np.column_stack([found.x, error]) * [[30.0 / (2.0 * np.pi)], [1e-2]]
+    return float(corner[0]), float(corner[1]), float(delay[0]), float(delay[1])
