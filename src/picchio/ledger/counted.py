@@ -17,9 +17,8 @@ from picchio.fatigue.sn.curve import SNCurve
 from picchio.ledger.blows import SEEN, Burst
 from picchio.ledger.damage import AS_LOGGED, BurstDamage, Sum, Totals
 from picchio.ledger.finding import NEAR
+from picchio.ledger.store import HOUR
 
-HOUR = 3600 * 10**9
-"""ns: what happens in the same hour (UTC) is added up."""
 _STRETCHES = 64  # at most
 _PLACES = 4096  # that are told apart; of more the half with the least damage are forgotten
 _LONGEST = 4000  # pieces of the force: a longer burst is not typical

@@ -90,10 +90,7 @@ def resting(model: Model) -> Callable[[FloatArray], FloatArray]:
         if not (many.damping_ratio > 0.0).all():
             raise InputError("a joint has no damping: after the blows it rings for ever",
                              key="damping_ratio", value=0.0)  # fmt: skip
-        mass, _ = many.mass_and_jacobian()
-        root = np.linalg.inv(np.linalg.cholesky(mass))
-        inner = np.einsum("pij,pj,pkj->pik", root, many.stiffness, root)
-        lowest = np.sqrt(np.linalg.eigvalsh(inner)[:, 0])
+        lowest = many.modes()[0][:, 0]
         return np.asarray(-math.log(RING_DOWN_LEVEL) / (many.damping_ratio.min() * lowest))
 
     return times
@@ -201,21 +198,12 @@ class Totals:
         Args:
             scale: (m,) factors; beyond `SCALES` the outermost slope goes on.
         """
-        grid, wanted = np.log(SCALES), np.log(scale)
-        found = np.zeros((len(self.scaled), len(scale)))
-        for j, row in enumerate(self.scaled):
-            with np.errstate(divide="ignore"):
-                values = np.log(np.where(row > 0.0, row, 0.0))
-            low = np.where(np.isfinite(values), values, -700.0)
-            inner = np.interp(wanted, grid, low)
-            for side, (a, b) in ((-1, (0, 1)), (1, (-2, -1))):
-                beyond = wanted < grid[0] if side < 0 else wanted > grid[-1]
-                rise = (low[b] - low[a]) / (grid[b] - grid[a])
-                end = grid[0] if side < 0 else grid[-1]
-                edge = low[0] if side < 0 else low[-1]
-                inner = np.where(beyond, edge + rise * (wanted - end), inner)
-            found[j] = np.where(inner > -600.0, np.exp(np.minimum(inner, 700.0)), 0.0)
-        return found
+        from scipy.interpolate import make_interp_spline
+
+        # exp(-700) stands for nothing, and what lies between it and something is nothing, too.
+        values = np.log(np.where(self.scaled > 0.0, self.scaled, np.exp(-700.0)))
+        found = make_interp_spline(np.log(SCALES), values, k=1, axis=1)(np.log(scale))
+        return np.where(found > -600.0, np.exp(np.minimum(found, 700.0)), 0.0)
 
 
 class Sum:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -14,11 +14,12 @@ from picchio.core import spoken
 from picchio.core.arrays import FloatArray
 from picchio.core.results import TableResult
 from picchio.fatigue.sn.curve import SNCurve
-from picchio.ledger.counted import HOUR, Counted
+from picchio.ledger.counted import Counted
 from picchio.ledger.forecast import Worlds, quantiles
+from picchio.ledger.store import DAY, HOUR
+from picchio.ledger.watch.changes import date_of
 from picchio.model.model import Model
 
-SECONDS_A_DAY = 86_400
 _LATELY = 28  # days that today's pace is taken from
 _STATIONS = 12
 
@@ -82,7 +83,7 @@ class Count(TableResult):
     def hours(self) -> float:
         """h, the time that was logged."""
         spans = self.counted.spans
-        return float((spans[:, 1] - spans[:, 0]).sum() / 3.6e12) if len(spans) else 0.0
+        return float((spans[:, 1] - spans[:, 0]).sum() / HOUR)
 
     @property
     def logged(self) -> str:
@@ -110,7 +111,7 @@ class Count(TableResult):
             return self.blows_per_hour * (self.hours_per_day or 0.0)
         if self.hours < 24.0:
             return None
-        span = (self.counted.last - self.counted.first) / 1e9 / SECONDS_A_DAY
+        span = (self.counted.last - self.counted.first) / DAY
         hour, table = self.counted.hours
         lately = hour > hour[-1] - 24 * _LATELY
         return float(table[lately, 0].sum() / min(max(span, 1.0), _LATELY))
@@ -146,10 +147,8 @@ class Count(TableResult):
         for name in ("p10", "p50", "p90"):
             blows = math.inf if left is None else left[name]
             days = blows / self.blows_a_day if self.blows_a_day else math.inf
-            found[name] = None
-            if days < 36500:
-                last = datetime.fromtimestamp(self.counted.last / 1e9, UTC)
-                found[name] = (last + timedelta(days=days)).date().isoformat()
+            then = self.counted.last + days * DAY
+            found[name] = date_of(int(then)) if days < 36500 else None
         return found
 
     def reached(self, left: dict[str, float] | None) -> str | None:
@@ -189,11 +188,11 @@ class Count(TableResult):
     def days(self) -> list[dict[str, Any]]:
         """Of each day with blows: date, blows, and the damage of each joint."""
         hour, table = self.counted.hours
-        day = hour // (SECONDS_A_DAY * 10**9 // HOUR)
+        day = hour // 24
         found = []
-        for which in np.unique(day):
+        for which in np.unique(day).tolist():
             rows = table[day == which].sum(axis=0)
-            date = datetime.fromtimestamp(int(which) * SECONDS_A_DAY, UTC).date().isoformat()
+            date = date_of(which * DAY)
             found.append({"date": date, "blows": int(rows[0]), "damage": rows[2:]})
         return found
 

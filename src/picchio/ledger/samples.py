@@ -196,9 +196,8 @@ class _Plan:
         self.met: set[str] = set()
         self.last: dict[str, tuple[IndexArray, FloatArray]] = {}
         self.before: dict[str, tuple[int, float]] = {}
-        self.poses: dict[str, int] = {}
         self.seen: dict[str, list[str]] = {}
-        names = robot.joint_names
+        names, joints = robot.joint_names, dict[str, str]()
         for key, to, _, entry in mapping.entries:
             if entry.remove is not None:
                 raise InputError("a log has no rest to take a mean of; give an offset",
@@ -209,17 +208,14 @@ class _Plan:
                     raise InputError("the robot has no such joint", key=key, value=rest,
                                      choices=names)  # fmt: skip
                 # The motor side where both are logged: the link side swings under the blows.
-                if word == "motor_position" or rest not in {
-                    p.partition(".")[2] for p in self.poses
-                }:
-                    self.poses = {
-                        p: j for p, j in self.poses.items() if p.partition(".")[2] != rest
-                    }
-                    self.poses[to] = list(names).index(rest)
+                if word == "motor_position" or rest not in joints:
+                    joints.pop(rest, None)
+                    joints[rest] = to
             elif word in ("force", "trigger"):
                 self.seen.setdefault(word, []).append(to)
             elif word in ("accelerometer", "acceleration") and self._at_tool(key, rest):
                 self.seen.setdefault("acceleration", []).append(to)
+        self.poses = {to: names.index(joint) for joint, to in joints.items()}
         for kind, found in self.seen.items():
             sensor = max(to.rpartition(".")[0] for to in found)  # one is enough
             self.seen[kind] = sorted(to for to in found if to.rpartition(".")[0] == sensor)
@@ -235,7 +231,6 @@ class _Plan:
         if not self.poses and self.fixed is None:
             raise InputError("no position was logged, so that nobody knows where the robot stood",
                              key="channel", hint=FIXED)  # fmt: skip
-        self.missing = [n for n in names if n not in {p.partition(".")[2] for p in self.poses}]
 
     def _at_tool(self, key: str, rest: str) -> bool:
         """Whether an acceleration is that of the link that carries the tool."""

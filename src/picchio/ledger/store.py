@@ -15,7 +15,7 @@ import json
 import sqlite3
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -50,7 +50,11 @@ CREATE INDEX feature_stamp ON feature (stamp);
 _PATIENCE = 60.0  # s that a writer waits for another
 _HELD = 1 << 17  # samples of a stream that are looked at together
 _NEVER = 2**63 - 1  # ns
-SHIFT = 8 * 3600 * 10**9
+HOUR = 3600 * 10**9
+"""ns."""
+DAY = 24 * HOUR
+"""ns."""
+SHIFT = 8 * HOUR
 """ns: what happens in the same eight hours (UTC) is added up."""
 MARGIN = 600 * 10**9
 """ns: what a shift adds up to depends on the samples so long before and after it, and on no other.
@@ -230,12 +234,11 @@ class _Union:
 
     def __init__(self, book: Ledger, table: str, stream: Stream, interval: tuple[int, int]) -> None:
         self._book, self._table, self._interval, self._at = book, table, interval, 0
-        with book._told():
-            rows = book._base.execute(
-                f"SELECT {table}.first, {table}.rowid FROM {table} JOIN log ON log.id = "
-                f"{table}.log WHERE log.stream = ? AND {table}.last >= ? AND {table}.first <= ?",
-                (stream.id, *interval),
-            ).fetchall()
+        rows = book.rows(
+            f"SELECT {table}.first, {table}.rowid FROM {table} JOIN log ON log.id = {table}.log "
+            f"WHERE log.stream = ? AND {table}.last >= ? AND {table}.first <= ?",
+            stream.id, *interval,
+        )  # fmt: skip
         self._rows = np.array([*sorted(rows), (_NEVER, 0)])
         columns = 0 if table == "pose" else stream.columns
         self._size = stream.size if columns else partial(np.linalg.norm, axis=1)
@@ -250,16 +253,13 @@ class _Union:
         """Read what begins until `last`, ns, or until so many samples are held."""
         stamps, values = [self.stamps], [self.values]
         while self.begin <= last and sum(map(len, stamps)) < size:
-            with self._book._told():
-                row = self._book._base.execute(
-                    f"SELECT stamps, sizes FROM {self._table} WHERE rowid = ?",
-                    (int(self._rows[self._at, 1]),),
-                ).fetchone()
-            if row is None:
+            query = f"SELECT stamps, sizes FROM {self._table} WHERE rowid = ?"
+            found = self._book.rows(query, int(self._rows[self._at, 1]))
+            if not found:
                 raise OutputError("was changed by another process meanwhile: run it again",
                                   file=self._book.path)  # fmt: skip
-            stamps.append(np.frombuffer(row[0], "<i8"))
-            values.append(np.frombuffer(row[1], "<f8").reshape(stamps[-1].size, -1))
+            stamps.append(np.frombuffer(found[0][0], "<i8"))
+            values.append(np.frombuffer(found[0][1], "<f8").reshape(stamps[-1].size, -1))
             self._at += 1
         if len(stamps) == 1:
             return
@@ -374,6 +374,16 @@ class Ledger:
                     self._base.execute("ROLLBACK")
                 raise
 
+    def rows(self, query: str, *values: object) -> list[Any]:
+        """What a query finds.
+
+        Args:
+            query: of SQL.
+            values: that stand for its question marks.
+        """
+        with self._told():
+            return self._base.execute(query, values).fetchall()
+
     def close(self) -> None:
         """Close the file."""
         self._base.close()
@@ -392,9 +402,7 @@ class Ledger:
             mapping: hash of how it is read.
             column: "id", or "file".
         """
-        with self._told():
-            rows = self._base.execute(f"SELECT mapping FROM log WHERE {column} = ?", (log,))
-            return (mapping,) in rows.fetchall()
+        return (mapping,) in self.rows(f"SELECT mapping FROM log WHERE {column} = ?", log)
 
     def stream(self, wanted: Stream) -> Stream:
         """The stream as the ledger has it: the gap stays what it was when it was new.
@@ -402,12 +410,8 @@ class Ledger:
         Args:
             wanted: as a log has it.
         """
-        with self._told():
-            row = self._base.execute("SELECT gap FROM stream WHERE id = ?", (wanted.id,)).fetchone()
-        if row is None:
-            return wanted
-        return Stream(wanted.kind, row[0], wanted.columns, wanted.threshold, wanted.foot,
-                      wanted.settings)  # fmt: skip
+        found = self.rows("SELECT gap FROM stream WHERE id = ?", wanted.id)
+        return replace(wanted, gap=found[0][0]) if found else wanted
 
     def add(
         self, log: str, mapping: str, name: str, stream: Stream, stretches: Iterable[Samples],
@@ -469,10 +473,7 @@ class Ledger:
 
     def logs(self) -> list[tuple[str, str, int, int, int]]:
         """Every log by time: (id, name, first ns, last ns, samples)."""
-        with self._told():
-            return self._base.execute(
-                "SELECT id, name, first, last, samples FROM log ORDER BY first, id"
-            ).fetchall()
+        return self.rows("SELECT id, name, first, last, samples FROM log ORDER BY first, id")
 
     def streams(self) -> list[tuple[Stream, IndexArray]]:
         """Each stream with logs, the surest kinds first, and the time that was logged.
@@ -483,18 +484,14 @@ class Ledger:
         from picchio.ledger.samples import KINDS
 
         found = []
-        with self._told():
-            for key, kind, gap, columns, settings in self._base.execute(
-                "SELECT id, kind, gap, columns, settings FROM stream"
-            ).fetchall():
-                threshold, foot, more = json.loads(settings)
-                spans = self._base.execute(
-                    "SELECT span.first, span.last FROM span JOIN log ON log.id = span.log "
-                    "WHERE log.stream = ?", (key,),
-                ).fetchall()  # fmt: skip
-                if spans:
-                    stream = Stream(kind, gap, columns, threshold, foot, more)
-                    found.append((stream, np.array(spans, np.int64)))
+        for key, *about, settings in self.rows(
+            "SELECT id, kind, gap, columns, settings FROM stream"
+        ):
+            spans = self.rows("SELECT span.first, span.last FROM span JOIN log ON "
+                              "log.id = span.log WHERE log.stream = ?", key)  # fmt: skip
+            if spans:
+                stream = Stream(*about, *json.loads(settings))
+                found.append((stream, np.array(spans, np.int64)))
         return sorted(found, key=lambda each: (KINDS.index(each[0].kind), each[0].id))
 
     def kept(self, stream: Stream, interval: tuple[int, int] = (0, _NEVER)) -> Iterator[Kept]:
@@ -533,17 +530,16 @@ class Ledger:
             at = np.searchsorted(poses.stamps, held.stamps[0], side="right")
             poses.drop(max(int(at) - 1, 0))
 
-    def features(self, shift: int) -> Iterator[tuple[str, int, float]]:
+    def features(self, shift: int) -> list[tuple[str, int, float]]:
         """(name, ns, value) of a shift, each once, by time, name and value.
 
         Args:
             shift: its number.
         """
-        with self._told():
-            yield from self._base.execute(
-                "SELECT DISTINCT name, stamp, value FROM feature WHERE stamp >= ? AND stamp < ? "
-                "ORDER BY stamp, name, value", (shift * SHIFT, (shift + 1) * SHIFT),
-            )  # fmt: skip
+        return self.rows(
+            "SELECT DISTINCT name, stamp, value FROM feature WHERE stamp >= ? AND stamp < ? "
+            "ORDER BY stamp, name, value", shift * SHIFT, (shift + 1) * SHIFT,
+        )  # fmt: skip
 
     def shifts(self) -> dict[int, str]:
         """Each shift that was logged, by time.
@@ -552,13 +548,12 @@ class Ledger:
             {number: hash of the logs that it depends on}.
         """
         logs: dict[int, set[str]] = {}
-        with self._told():
-            self._version = self._base.execute("PRAGMA data_version").fetchone()
-            for log, mapping, first, last in self._base.execute(
-                "SELECT log.id, mapping, span.first, span.last FROM span JOIN log ON log.id = log"
-            ):
-                for number in range((first - MARGIN) // SHIFT, (last + MARGIN) // SHIFT + 1):
-                    logs.setdefault(number, set()).add(log + mapping)
+        self._version = self.rows("PRAGMA data_version")
+        for log, mapping, first, last in self.rows(
+            "SELECT log.id, mapping, span.first, span.last FROM span JOIN log ON log.id = log"
+        ):
+            for number in range((first - MARGIN) // SHIFT, (last + MARGIN) // SHIFT + 1):
+                logs.setdefault(number, set()).add(log + mapping)
         return {
             number: hashlib.sha256("".join(sorted(logs[number])).encode()).hexdigest()
             for number in sorted(logs)
@@ -571,11 +566,8 @@ class Ledger:
             shift: its number.
             key: of all that it depends on.
         """
-        with self._told():
-            rows = self._base.execute(
-                "SELECT told FROM shift WHERE number = ? AND key = ?", (shift, key)
-            ).fetchall()
-        return rows[0][0] if rows else None
+        found = self.rows("SELECT told FROM shift WHERE number = ? AND key = ?", shift, key)
+        return found[0][0] if found else None
 
     def tell(self, shift: int, key: str, told: str) -> None:
         """Keep what a shift adds up to, unless another process has changed the ledger meanwhile.
@@ -586,7 +578,7 @@ class Ledger:
             told: as text.
         """
         with self.writing():
-            if self._base.execute("PRAGMA data_version").fetchone() == self._version:
+            if self.rows("PRAGMA data_version") == self._version:
                 row = (shift, key, told)
                 self._base.execute("INSERT OR REPLACE INTO shift VALUES (?, ?, ?)", row)
 

@@ -81,6 +81,13 @@ class ManyPoses:
             jacobian = np.einsum("pde,pdn->pen", np.array(turns).reshape(-1, 3, 3), jacobian)
         return mass, np.ascontiguousarray(jacobian)
 
+    def modes(self) -> tuple[FloatArray, FloatArray]:
+        """Undamped modes: (p, n) rad/s, ascending; (p, n, n), a mode a column, S^T M S = I."""
+        mass, _ = self.mass_and_jacobian()
+        root = np.linalg.inv(np.linalg.cholesky(mass))
+        squared, vectors = np.linalg.eigh(np.einsum("pij,pj,pkj->pik", root, self.stiffness, root))
+        return np.sqrt(squared), np.einsum("pji,pjk->pik", root, vectors)
+
     def gravity_torque(self) -> FloatArray:
         """(p, n) N m (N), that the springs carry at rest, added masses included."""
         if self._model.gravity_balanced:

@@ -17,7 +17,7 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray, IndexArray
 from picchio.ledger.blows import Burst
-from picchio.ledger.store import SHIFT
+from picchio.ledger.store import DAY, SHIFT
 from picchio.model.many_poses import ManyPoses
 from picchio.model.model import Model
 
@@ -89,7 +89,7 @@ class Change:
         """As the JSON of a count has it."""
         when = self.reading.when
         dates = [date_of(int(when[k])) for k in (self.onset, self.onset_low, self.onset_high)]
-        days = (when[-1] - when[self.onset]) / 8.64e13
+        days = (when[-1] - when[self.onset]) / DAY
         moved = "rose" if self.value > 0.0 else "fell"
         between = f" ({dates[1]} to {dates[2]})" if dates[1] < dates[2] else ""
         words = (
@@ -186,12 +186,9 @@ def find(readings: Sequence[Reading], alarms: float = ALARMS) -> list[Change]:
 def _covariates(reading: Reading) -> FloatArray:
     """(t, c) a constant, and the covariates that vary."""
     table = np.vstack([np.ones(reading.values.size), reading.covariates]).T
-    return np.asarray(table[:, _useful(table[:FIRST])])
-
-
-def _useful(table: FloatArray) -> IndexArray:
-    """The columns that vary, after the constant."""
-    return np.array([0, *(k for k in range(1, table.shape[1]) if np.ptp(table[:, k]) > 0.0)])
+    varies = np.ptp(table[:FIRST], axis=0) > 0.0
+    varies[0] = True
+    return np.asarray(table[:, varies])
 
 
 def _told(reading: Reading, table: FloatArray) -> Change:
@@ -348,13 +345,9 @@ def _rung(model: Model, rows: Sequence[dict[str, float]]) -> dict[str, Any] | No
     many = ManyPoses(model, poses) if rows else None
     if many is None or not many.compiled:
         return None
-    mass, _ = many.mass_and_jacobian()
-    root = np.linalg.inv(np.linalg.cholesky(mass))
-    squared, vectors = np.linalg.eigh(np.einsum("pij,pj,pkj->pik", root, many.stiffness, root))
-    shapes = np.einsum("pji,pjk->pik", root, vectors)
-    share = many.stiffness[:, :, None] * shapes**2 / squared[:, None, :]
-    frequency = np.sqrt(squared) / (2.0 * np.pi)
-    n = frequency.shape[1]
+    omega, shapes = many.modes()
+    share = many.stiffness[:, :, None] * (shapes / omega[:, None, :]) ** 2
+    frequency, n = omega / (2.0 * np.pi), omega.shape[1]
     found = [(k, i, told) for k, told in enumerate(rows) for i in range(n) if f"f{i}" in told]
     pose, mode = (np.array([each[part] for each in found], int) for part in (0, 1))
     off = np.array([told[f"f{i}"] for _, i, told in found]) / frequency[pose, mode]
