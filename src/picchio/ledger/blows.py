@@ -359,19 +359,13 @@ def burst(blows: Sequence[Blow]) -> Burst:
         if late.sum() < 2:
             continue
         time, force = time[late], force[late]
-        length_of = np.diff(time)
-        real = length_of > 0.0
-        start += time[:-1][real].tolist()
-        constant += force[:-1][real].tolist()
-        slope += (np.diff(force)[real] / length_of[real]).tolist()
-        start.append(float(time[-1]))
-        constant.append(0.0)
-        slope.append(0.0)
+        rises, steps = np.diff(force), np.diff(time)
+        start.append(time)
+        constant.append(np.append(force[:-1], 0.0))
+        slope.append(np.append(np.divide(rises, steps, np.zeros(steps.size), where=steps > 0.0), 0))
         reached = float(time[-1])
+    begin = np.concatenate(start)
     # A blow that begins where the last one ends leaves no silence between them.
-    keep = np.append(np.diff(start) > 0.0, True)
-    begin = np.array(start)[keep]
-    return Burst(
-        tuple(blows), begin - begin[0], np.array(constant)[keep], np.array(slope)[keep], direction,
-        blows[0].pose,
-    )  # fmt: skip
+    keep = np.append(np.diff(begin) > 0.0, True)
+    begin, level, rise = (x[keep] for x in (begin, np.concatenate(constant), np.concatenate(slope)))
+    return Burst(tuple(blows), begin - begin[0], level, rise, direction, blows[0].pose)

@@ -106,10 +106,8 @@ def burst_damages_of(
         curves: of the n flexible joints.
         bursts: in any order.
     """
-    found: list[BurstDamage] = []
-    for k in range(0, len(bursts), _BATCH):
-        found += _batch(model, curves, bursts[k : k + _BATCH])
-    return found
+    parts = (bursts[k : k + _BATCH] for k in range(0, len(bursts), _BATCH))
+    return [made for part in parts for made in _batch(model, curves, part)]
 
 
 def _batch(

@@ -225,12 +225,11 @@ class Count(TableResult):
         return bool(np.nan_to_num(self.counted.totals.damage).any())
 
     def _rows(self) -> list[dict[str, Any]]:
-        rows = []
-        for j, name in enumerate(self.model.robot.flexible_names):
-            left = self.left(j) or {"p50": math.nan}
-            rows.append({"name": name, "damage": float(self.counted.totals.damage[j]),
-                         "blows_left_p50": left["p50"]})  # fmt: skip
-        return rows
+        return [
+            {key: joint[key] for key in ("name", "damage")}
+            | {"blows_left_p50": (joint["blows_left"] or {"p50": math.nan})["p50"]}
+            for joint in self.joints()
+        ]
 
     def joints(self) -> list[dict[str, Any]]:
         """What is told of each joint."""
