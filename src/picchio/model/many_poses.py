@@ -82,7 +82,11 @@ class ManyPoses:
         return mass, np.ascontiguousarray(jacobian)
 
     def modes(self) -> tuple[FloatArray, FloatArray]:
-        """Undamped modes: (p, n) rad/s, ascending; (p, n, n), a mode a column, S^T M S = I."""
+        """Undamped modes, by Cholesky's factor of the masses.
+
+        Returns:
+            (p, n) rad/s, ascending; (p, n, n) shapes S, a mode a column, with S^T M S = I.
+        """
         mass, _ = self.mass_and_jacobian()
         root = np.linalg.inv(np.linalg.cholesky(mass))
         squared, vectors = np.linalg.eigh(np.einsum("pij,pj,pkj->pik", root, self.stiffness, root))

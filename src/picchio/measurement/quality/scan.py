@@ -131,13 +131,21 @@ class RecordScan:
         return self.record.file
 
     def place(self, sample: int) -> str:
-        """Where a sample is, in words."""
+        """Where a sample is, in words.
+
+        Args:
+            sample: its index.
+        """
         source = self.record.source
         line = f"{source.row_word} {sample + source.first_row}"
         return f"{line}, t = {self.when(sample):.4g} s"
 
     def when(self, sample: int) -> float:
-        """s, the time of a sample."""
+        """s, the time of a sample.
+
+        Args:
+            sample: its index.
+        """
         return self.clock.start + sample * self.clock.step
 
 
