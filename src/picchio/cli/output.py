@@ -19,6 +19,7 @@ from picchio.cli.waiting import waiting
 from picchio.core.errors import InputError, OutputError, PicchioWarning
 from picchio.core.files import atomic_write, is_stream
 from picchio.core.guard import guard
+from picchio.core.listing import plainly
 from picchio.core.results import json_pieces
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from rich.table import Table
     from rich.text import Text
 
+    from picchio.core.listing import Listing
     from picchio.core.results import Result
 
 _PIPE = 10_000  # characters: no line wraps there
@@ -181,6 +183,22 @@ def table(headers: Iterable[str], rows: Iterable[Iterable[str | Text]], **look: 
         return content if isinstance(content, Text) else Text(printable(content))
 
     return FittedTable(list(headers), [Row([cell(c) for c in row]) for row in rows], **look)
+
+
+def listed(listing: Listing, title: str | None = None) -> FittedTable:
+    """A listing to print, units below the names of its columns.
+
+    Args:
+        listing: the table.
+        title: in place of its own.
+    """
+    heads = [f"{'>' * each.numbers}{each.name}\n{each.unit}".rstrip() for each in listing.columns]
+    made = table(
+        heads, listing.rows(plainly), title=(listing.title if title is None else title) or None
+    )
+    for row in made.rows:
+        row.style = "bold" if row.cells[0].plain == listing.bold else None
+    return made
 
 
 def count_of(count: float, noun: str) -> str:

@@ -8,6 +8,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from picchio.core.listing import Listing
 from picchio.core.shown import Shown
 
 MOST_ROWS = 30
@@ -60,8 +61,26 @@ def sheet(
     return f'<details open><summary style="cursor:pointer">{line}</summary>{body}</details>'
 
 
+def listed(listing: Listing) -> tuple[list[str], list[tuple[str, ...]]]:
+    """The headers and rows of a listing, for `sheet`.
+
+    Args:
+        listing: the table.
+    """
+    return listing.heads, listing.rows(told)
+
+
 def cell(value: Any) -> str:
-    """One value, escaped: numbers to four digits, a dash where there is none.
+    """One value as `told` has it, escaped.
+
+    Args:
+        value: a number, text, an array or a sequence of them; None is a dash.
+    """
+    return escape(told(value))
+
+
+def told(value: Any) -> str:
+    """One value: numbers to four digits, a dash where there is none.
 
     Args:
         value: a number, text, an array or a sequence of them; None is a dash.
@@ -75,9 +94,9 @@ def cell(value: Any) -> str:
             return "–"
         return "∞" if value == math.inf else f"{value:.4g}"
     if isinstance(value, (list, tuple)):
-        text = ", ".join(cell(part) for part in value)
+        text = ", ".join(map(told, value))
         return text if len(value) == 1 else f"({text})"
-    return escape("–" if value is None else str(value))
+    return "–" if value is None else str(value)
 
 
 class Page(Shown):

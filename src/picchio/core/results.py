@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from os import PathLike
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from picchio.core.listing import Column, Listing
 from picchio.core.shown import Shown
 
 if TYPE_CHECKING:
@@ -61,8 +62,9 @@ class Result(Shown):
     """What the answers of all commands have in common.
 
     A subclass says what it holds in `_content` and what matters in `_headline`; where a notebook
-    shall unfold more below that line it has a `_repr_html_` (see `picchio.core.html.sheet`). If it
-    is a dataclass it is declared with `repr=False`, or the dataclass's own repr hides this one.
+    shall unfold more below that line it has a `_repr_html_` (see `picchio.core.html.sheet`), or, if
+    that is a table, a `_listing`. If it is a dataclass it is declared with `repr=False`, or the
+    dataclass's own repr hides this one.
 
     Attributes:
         PAGE: the function that draws it for `picchio.report`, as "module:function" with the
@@ -135,12 +137,19 @@ class TableResult(Result):
             found[column].attrs["units"] = unit
         return found
 
-    def _repr_html_(self) -> str:
-        from picchio.core.html import sheet
-
+    def _listing(self) -> Listing:
+        """The table as people read it."""
         rows = [dict(row) for row in self._rows()]
-        names = list(dict.fromkeys(name for row in rows for name in row))
-        units = [self.UNITS.get(name) for name in names]
-        columns = [f"{n} [{u}]" if u else n for n, u in zip(names, units, strict=True)]
-        cells = [[row.get(name) for name in names] for row in rows]
-        return sheet(type(self).__name__, None, columns, cells, head=self._headline())
+        names = dict.fromkeys(name for row in rows for name in row)
+        columns = [
+            Column(name, self.UNITS.get(name, ""), tuple(row.get(name) for row in rows))
+            for name in names
+        ]
+        return Listing(type(self).__name__, tuple(columns))
+
+    def _repr_html_(self) -> str:
+        from picchio.core.html import listed, sheet
+
+        shown = self._listing()
+        head = shown.head or self._headline()
+        return sheet(shown.title, shown.facts, *listed(shown), shown.note, head)

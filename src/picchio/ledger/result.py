@@ -12,6 +12,7 @@ import numpy as np
 
 from picchio.core import spoken
 from picchio.core.arrays import FloatArray
+from picchio.core.listing import Key, Listing
 from picchio.core.results import TableResult
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.ledger.counted import Counted
@@ -230,6 +231,22 @@ class Count(TableResult):
             | {"blows_left_p50": (joint["blows_left"] or {"p50": math.nan})["p50"]}
             for joint in self.joints()
         ]
+
+    def _listing(self) -> Listing:
+        """Life used and left."""
+        end = lambda p: lambda j: spoken.count(j["blows_left"][p]) if j["blows_left"] else None  # noqa: E731
+        columns: dict[str, Key] = {
+            "joint": "name",
+            "life used [%]": lambda j: spoken.per_cent(j["damage"]),
+            "90 % interval [%]": lambda j: spoken.between(
+                j["damage_interval"] or [None], spoken.per_cent
+            ),
+            "blows left, P10": end("p10"),
+            "P50": end("p50"),
+            "P90": end("p90"),
+            "P50 is reached": lambda j: self.reached(j["blows_left"]) or None,
+        }
+        return Listing.of("Life used and left", self.joints(), columns)
 
     def joints(self) -> list[dict[str, Any]]:
         """What is told of each joint."""

@@ -15,8 +15,8 @@ from typing import Any, ClassVar
 
 from picchio.core import spoken
 from picchio.core.errors import InputError
-from picchio.core.html import sheet
 from picchio.core.json_files import read_json
+from picchio.core.listing import Key, Listing
 from picchio.core.provenance import provenance
 from picchio.core.results import Result, TableResult, plain
 from picchio.core.toml import read_toml
@@ -197,10 +197,15 @@ class Comparison(TableResult):
         names = ", ".join(item.name for item in self.items)
         return self.bottom_line or f"{names}: {len(self.figures)} results differ"
 
-    def _repr_html_(self) -> str:
-        rows = [[row.label, *row.shown] for row in (*self.entered, *self.figures)]
-        heads = ["", *(item.name for item in self.items)]
-        return sheet("Comparison", None, heads, rows, " ".join(self.notes), self._headline())
+    def _listing(self, rows: Sequence[Difference] | None = None, title: str = "") -> Listing:
+        """What differs: some rows, or all that matter; of two items their ratio, too."""
+        columns: list[tuple[str, Key]] = [("", "label")]
+        for k, item in enumerate(self.items):
+            columns.append((item.name, lambda row, k=k: row.shown[k]))  # type: ignore[misc]
+        if len(self.items) == 2:
+            columns.append(("ratio", _ratio))
+        shown = (*self.entered, *self.figures) if rows is None else rows
+        return Listing.of(title or "Comparison", shown, columns, note=" ".join(self.notes))
 
     def _content(self) -> dict[str, Any]:
         items = [
@@ -209,6 +214,10 @@ class Comparison(TableResult):
         ]
         return {"format": FORMAT, "items": items, "inputs": self.inputs, "results": self.results,
                 "notes": self.notes, "provenance": self.provenance}  # fmt: skip
+
+
+def _ratio(row: Difference) -> str:
+    return "" if math.isnan(row.ratios[1]) else spoken.number(row.ratios[1], least=0.0)
 
 
 def compare(

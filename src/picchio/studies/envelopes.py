@@ -9,9 +9,10 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from picchio.core import spoken
 from picchio.core.arrays import FloatArray, IndexArray
 from picchio.core.errors import InputError
-from picchio.core.html import sheet
+from picchio.core.listing import InUnit, Key, Listing
 from picchio.core.processes import one_thread
 from picchio.core.provenance import provenance
 from picchio.core.results import TableResult
@@ -19,7 +20,7 @@ from picchio.core.shown import seeing
 from picchio.excitation.excitation import Excitation
 from picchio.fatigue.shaft_stress import shaft_stress_per_torque
 from picchio.model.model import Model, ModelLike
-from picchio.robot.units import JointUnits, column, units_of
+from picchio.robot.units import JointUnits, units_of
 from picchio.robot.varied import cases_of
 from picchio.studies.default_task import task_of
 from picchio.studies.rivet.pose import ModelAtPose
@@ -205,15 +206,19 @@ class DirectionEnvelope(TableResult):
             for joint in self._content()["joints"]
         ]
 
-    def _repr_html_(self) -> str:
-        small, peaks = column([u.small for u in self.units],
-                              [f"{1e3 * x:.4g}" for x in self.peak_deflection])  # fmt: skip
-        load, torques = column([u.load for u in self.units],
-                               [f"{x:.4g}" for x in self.peak("torque")])  # fmt: skip
-        columns = ("joint", f"peak deflection [{small}]", "worst direction",
-                   f"peak torque [{load}]", "peak stress [MPa]")  # fmt: skip
-        rows = zip(self.joint_names, peaks, self.worst_direction.round(3), torques,
-                   1e-6 * self.peak("stress"), strict=True)  # fmt: skip
+    def _listing(self) -> Listing:
+        """What each joint bears at worst, and along which direction."""
+        peaks, torques = self._told(1e3, "deflection"), self._told(1.0, "torque")
+        stresses, along = 1e-6 * self.peak("stress"), self.worst_direction.round(9) + 0.0
+        columns: dict[str, Key] = {
+            "joint": lambda j: self.joint_names[j],
+            "peak deflection": lambda j: InUnit(peaks[j], self.units[j].small),
+            "peak torque": lambda j: InUnit(torques[j], self.units[j].load),
+            "peak stress [MPa]": lambda j: stresses[j],
+            "worst direction (either sign) [x, y, z]": lambda j: ", ".join(
+                f"{c:.3f}" for c in along[j]
+            ),
+        }
         facts = {
             "pose [rad, m]": self.pose,
             "blows": self.excitation.describe(),
@@ -221,10 +226,23 @@ class DirectionEnvelope(TableResult):
             "natural frequencies [Hz]": self.natural_frequencies,
         }
         k = int(self.peak_deflection.argmax())
-        along = ", ".join(f"{c:.3g}" for c in self.worst_direction[k])
+        told = ", ".join(f"{c:.3g}" for c in self.worst_direction[k])
         most = f"{1e3 * self.peak_deflection[k]:.4g} {self.units[k].small}"
-        head = f"{self.joint_names[k]} most, {most} along ({along})"
-        return sheet(f"Direction envelope of {self.robot}", facts, columns, rows, head=head)
+        return Listing.of(
+            f"Direction envelope of {self.robot}",
+            range(len(self.joint_names)),
+            columns,
+            facts=facts,
+            head=f"{self.joint_names[k]} most, {most} along ({told})",
+        )
+
+    def _told(self, scale: float, quantity: Quantity) -> list[float | str]:
+        """The peaks; as intervals where they are estimates."""
+        both = zip(self.peak(quantity), self.peak_interval(quantity), strict=True)
+        return [
+            scale * peak if low == high else spoken.between((scale * low, scale * high))
+            for peak, (low, high) in both
+        ]
 
     def _content(self) -> dict[str, Any]:
         joints = {

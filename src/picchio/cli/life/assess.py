@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -33,23 +32,22 @@ from picchio.cli.output import (
     count_of,
     deliver,
     details,
+    listed,
     notice_first,
     progress,
     styled,
-    table,
     telling,
     write_report,
 )
 from picchio.core import spoken
 from picchio.core.errors import InputError
+from picchio.core.listing import Key, Listing
 from picchio.core.results import plain
-from picchio.robot.units import column
 
 if TYPE_CHECKING:
-    from picchio.cli.layout import FittedTable
-    from picchio.studies.assessment.backwards import Allowable, AllowableLoads
+    from picchio.studies.assessment.backwards import AllowableLoads
     from picchio.studies.assessment.method_comparison import Term
-    from picchio.studies.assessment.result import Assessment, JointLife, OperationResult
+    from picchio.studies.assessment.result import Assessment, OperationResult
     from picchio.studies.tasks import Task
 
 
@@ -237,6 +235,8 @@ _NOT_SAFE = 3
 
 def show(found: Assessment, task: Task, terms: tuple[Term, ...] = ()) -> None:
     """Print an assessment: verdict, joints, then what explains them."""
+    from picchio.studies.assessment.method_comparison import terms_listing
+
     out = console()
     told, allowed = found.verdict, found.allowable
     on = f" on {task.files[0].name}" if task.files else ""
@@ -251,22 +251,20 @@ def show(found: Assessment, task: Task, terms: tuple[Term, ...] = ()) -> None:
     for line in filter(None, (found.notice, task.note)):
         out.print(f"{line}.", style="yellow")
     out.print()
-    out.print(_estimated_table(found) if found.notice else _life_table(found))
+    joints = found._listing()
+    if found.notice:
+        order = [each.name for each in joints.columns][:-1]
+    else:  # what matters most first: a narrow screen shows no more
+        order = ["joint", "utilisation", "reducer", "rivets to failure", "peak stress",
+                 "gravity stress", "peak deflection", "peak torque", "gravity torque",
+                 "damage a rivet", "worst at"]  # fmt: skip
+    out.print(listed(joints.only(*order)))
     for line in told.reasons:
         if line not in (found.notice, task.note):
             out.print(f"  - {line}")
     details()
-    reducers = [
-        (j.name, j.reducer, j.reducer_governed_by or "-",
-         *(map(spoken.number, (one.torque, one.limit)) if (one := j.reducer_governing) else "--"),
-         j.told_percent("reducer_utilisation"))
-        for j in found.joints
-        if j.reducer
-    ]  # fmt: skip
-    if reducers:
-        heads = ("joint", "reducer", "the limit that binds", ">torque\nN m", ">limit\nN m",
-                 ">utilisation\n%")  # fmt: skip
-        out.print(table(heads, reducers, title="The reducers"))
+    if any(joint.reducer for joint in found.joints):
+        out.print(listed(found._reducers()))
     out.print("The task", style="dim")
     for operation in found.operations:
         x, y, z = operation.direction
@@ -280,12 +278,12 @@ def show(found: Assessment, task: Task, terms: tuple[Term, ...] = ()) -> None:
             out.print(f"  pose {k + 1}, rad (m): {', '.join(f'{q:.3g}' for q in pose)}")
     out.print()
     if len(found.operations) > 1 and any(joint.damage_share for joint in found.joints):
-        out.print(_share_table(found))
+        out.print(listed(_shares(found)))
     # Of an estimated stiffness both are single cases.
     if found.steady_state and not found.notice:
-        out.print(_steady_table(found))
+        out.print(listed(found._steady()))
     if terms:
-        out.print(_terms_table(terms))
+        out.print(listed(terms_listing(terms)))
     out.print("How this was computed", style="dim")
     for line in found.assumptions:
         if line not in told.reasons:
@@ -293,125 +291,22 @@ def show(found: Assessment, task: Task, terms: tuple[Term, ...] = ()) -> None:
     out.print()
 
 
-def _life_table(found: Assessment) -> FittedTable:
-    shafts = [joint for joint in found.joints if joint.sn_curve]
-    columns: dict[str, Callable[[JointLife], str]] = {"joint": lambda j: j.name}
-
-    def in_units(title: str, unit: str, value: Callable[[JointLife], float]) -> None:
-        """A column whose unit is each joint's own."""
-        joints = found.joints
-        head, cells = column([getattr(j.units, unit) for j in joints],
-                             [spoken.number(value(j)) for j in joints])  # fmt: skip
-        by_name = {joint.name: text for joint, text in zip(joints, cells, strict=True)}
-        columns[f">{title}\n{head}"] = lambda j: by_name[j.name]
-
-    if shafts:
-        columns[">utilisation,\nshaft, %"] = lambda j: j.told_percent("utilisation")
-    if any(joint.reducer for joint in found.joints):
-        columns[">reducer,\n%"] = lambda j: j.told_percent("reducer_utilisation")
-    if shafts:
-        columns[">rivets to\nfailure"] = lambda j: j.told_life if j.sn_curve else "unknown"
-        columns[">peak\nstress\nMPa"] = lambda j: spoken.number(j.peak_shear_stress / 1e6)
-        columns[">gravity\nstress\nMPa"] = lambda j: spoken.number(j.gravity_shear_stress / 1e6)
-    in_units("peak\ndeflection", "small", lambda j: 1e3 * j.peak_deflection)
-    if len(shafts) < len(found.joints):
-        in_units("peak\ntorque", "load", lambda j: j.peak_torque)
-        in_units("gravity\ntorque", "load", lambda j: j.gravity_torque)
-    if shafts:
-        columns[">damage\na rivet"] = lambda j: (
-            spoken.number(j.damage_per_rivet, least=0.0) if j.sn_curve else "-"
-        )
-    columns["worst at"] = lambda j: f"{j.worst_operation}, pose {j.worst_pose + 1}"
-    made = table(
-        columns,
-        ([cell(joint) for cell in columns.values()] for joint in found.joints),
-        title="Life of the joints" if shafts else "The joints",
-    )
-    for row, joint in zip(made.rows, found.joints, strict=True):
-        row.style = "bold" if joint.name == found.verdict.joint else None
-    return made
-
-
-def _estimated_table(found: Assessment) -> FittedTable:
-    """The joints of a robot whose drives are estimates: intervals only."""
-    load, rows = found.intervals()
-    heads = ("joint", ">rivets to\nfailure", ">utilisation:\ntorque, %", ">in fatigue,\n%",
-             ">ends\nfirst, %", f">torque,\n{load}")  # fmt: skip
-    return table(heads, rows, title="The joints, 80 % ranges (gravity and blows together)")
-
-
-def _share_table(found: Assessment) -> FittedTable:
-    names = [operation.name for operation in found.operations]
-    rows = []
-    for joint in found.joints:
-        shares = [joint.damage_share.get(name) for name in names]
-        rows.append([joint.name, *("-" if s is None else f"{100 * s:.3g}" for s in shares)])
-    heads = ["joint", *(f">{name}" for name in names)]
-    return table(heads, rows, title="Share of each joint's damage, %")
-
-
-def _steady_table(found: Assessment) -> FittedTable:
-    title = "The paper's steady state against a rivet as it happens\n(largest over the task"
-    units = [found.joint(check.joint).units.small for check in found.steady_state]
-    small, steady = column(units, [spoken.number(c.steady_peak * 1e3) for c in found.steady_state])
-    _, rest = column(units, [spoken.number(c.rest_peak * 1e3) for c in found.steady_state])
-    heads = ["joint", f">steady\npeak\n{small}", f">rivet's\npeak\n{small}", ">\nratio\n"]
-    rows = [
-        [check.joint, steady[k], rest[k], spoken.number(check.peak_ratio)]
-        for k, check in enumerate(found.steady_state)
-    ]
-    if any(not math.isnan(check.paper_life) for check in found.steady_state):
-        title += "; the paper's S-N curve on both"
-        heads += [
-            ">rivets,\nsteady, one\ncycle a hit",
-            ">rivets,\nfrom rest,\ncounted",
-            ">\nratio\n",
-        ]
-        for row, check in zip(rows, found.steady_state, strict=True):
-            lives = (check.paper_life, check.counted_life)
-            row += [*map(spoken.count, lives), spoken.number(check.life_ratio)]
-    return table(heads, rows, title=f"{title})")
-
-
-def _terms_table(terms: tuple[Term, ...]) -> FittedTable:
-    rows = []
-    for term in terms:
-        known = math.isfinite(term.factor)
-        compared = (f"{term.factor:.3g}", term.against or "") if known else ("", "")
-        rows.append([term.name, spoken.count(term.rivets_to_failure), *compared, term.what])
-    return table(
-        ("term", ">rivets to\nfailure", ">times the\nlife of", "", "what changes"),
-        rows,
-        title="How far the paper's method is from the default one, an assumption at a time",
-    )
+def _shares(found: Assessment) -> Listing:
+    """What each operation has of each joint's damage."""
+    columns: dict[str, Key] = {"joint": "name"}
+    for operation in found.operations:
+        share = lambda j, name=operation.name: 100.0 * j.damage_share.get(name, math.nan)  # noqa: E731
+        columns[f"{operation.name} [%]"] = share
+    return Listing.of("Share of each joint's damage", found.joints, columns)
 
 
 def _show_allowable(found: AllowableLoads, task: Task, life: Assessment) -> None:
     """Print what a target life allows."""
+    from picchio.studies.assessment.backwards import listing_of
+
     out = console()
-    load, torques = column(
-        [life.joint(j.joint).units.load for j in found],
-        list(map(spoken.number, (j.peak_torque for j in found))),
-    )
-    peaks = dict(zip((j.joint for j in found), torques, strict=True))
-    columns: dict[str, Callable[[Allowable], str]] = {
-        "joint": lambda j: j.joint,
-        ">rivets\nas it is": lambda j: spoken.count(j.life),
-        ">force\ntimes": lambda j: "-" if j.met is None else spoken.number(j.force_factor),
-        "by its": lambda j: j.governed_by or "-",
-        ">hits\na rivet": lambda j: (
-            "-" if j.met is None else spoken.UNLIMITED if j.hits is None else str(j.hits)
-        ),
-        ">shaft radius\nat least\nmm": lambda j: spoken.number(1e3 * j.radius),
-        f">peak\ntorque\n{load}": lambda j: peaks[j.joint],
-        "smallest\nreducer": lambda j: j.reducer or "-",
-    }
-    sure = "" if found[0].survival is None else f", survival {found[0].survival:g}"
-    sure += "" if found.held is None else ", at the stated values"
-    out.print(table(
-        columns, ([cell(joint) for cell in columns.values()] for joint in found),
-        title=f"What a life of {spoken.count(found[0].rivets)} rivets{sure} allows",
-    ))  # fmt: skip
+    loads = {joint.name: joint.units.load for joint in life.joints}
+    out.print(listed(listing_of(found.joints, loads, found.held)))
     for key, ends in found.intervals.items():
         if not isinstance(ends, dict):
             out.print(f"In 80 % of the drawn cases the most {_MOST[key]}: {spoken.allowed(ends)}.")

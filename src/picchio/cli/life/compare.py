@@ -10,6 +10,7 @@ from picchio.cli.output import (
     console,
     deliver,
     details,
+    listed,
     progress,
     styled,
     table,
@@ -76,13 +77,4 @@ def _show_rows(found: Comparison, rows: Sequence[Difference], title: str) -> Non
     if not rows:
         out.print(f"{title}: nothing.\n")
         return
-    names = [item.name for item in found.items]
-    two = len(names) == 2
-    cells = [[row.label, *row.shown, *([_ratio(row.ratios[1])] if two else [])] for row in rows]
-    out.print(
-        table(["", *(f">{n}" for n in names), *([">ratio"] if two else [])], cells, title=title)
-    )
-
-
-def _ratio(value: float) -> str:
-    return "" if value != value else spoken.number(value, least=0.0)
+    out.print(listed(found._listing(rows, title)))

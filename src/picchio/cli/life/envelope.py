@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from picchio.cli.app import app
 from picchio.cli.options import (
     FlexOption,
@@ -20,11 +18,10 @@ from picchio.cli.options import (
     WidthOption,
     pose_given,
 )
-from picchio.cli.output import console, deliver, styled, table
+from picchio.cli.output import console, deliver, listed, styled
 from picchio.core import spoken
 
 if TYPE_CHECKING:
-    from picchio.core.arrays import FloatArray
     from picchio.studies.envelopes import DirectionEnvelope
 
 
@@ -63,16 +60,7 @@ def envelope(
     deliver(found.to_dict(), json, lambda: _show(found))
 
 
-def _told(values: FloatArray, ends: FloatArray) -> list[str]:
-    """Numbers as people read them, as intervals where they are estimates."""
-    return [
-        spoken.number(value) if low == high else spoken.between((low, high))
-        for value, (low, high) in zip(values, ends, strict=True)
-    ]
-
-
 def _show(found: DirectionEnvelope) -> None:
-    from picchio.robot.units import column
     from picchio.vibration.closed_form.response import described
 
     out = console()
@@ -82,24 +70,7 @@ def _show(found: DirectionEnvelope) -> None:
     out.print(f"  {found.excitation.describe()}")
     frequencies = ", ".join(map(spoken.number, found.natural_frequencies))
     out.print(f"  natural frequencies {frequencies} Hz\n")
-    stresses = found.peak("stress") / 1e6
-    small, peaks = column([u.small for u in found.units],
-                          _told(1e3 * found.peak(), 1e3 * found.peak_interval()))  # fmt: skip
-    told = _told(found.peak("torque"), found.peak_interval("torque"))
-    load, torques = column([u.load for u in found.units], told)
-    rows = [
-        (
-            name,
-            peaks[j],
-            torques[j],
-            "-" if np.isnan(stresses[j]) else spoken.number(stresses[j]),
-            ", ".join(f"{c + 0.0:.3f}" for c in found.worst_direction[j].round(9)),
-        )
-        for j, name in enumerate(found.joint_names)
-    ]
-    heads = ("joint", f">peak\ndeflection\n{small}", f">peak\ntorque\n{load}", ">peak\nstress\nMPa",
-             ">worst direction\n(either sign)\nx, y, z")  # fmt: skip
-    out.print(table(heads, rows, title="Estimated: P10 to P90" if found.estimated else None))
+    out.print(listed(found._listing(), "Estimated: P10 to P90" if found.estimated else ""))
     x, y, z = found.worst_tool_direction
     out.print(
         f"The tool moves most, {found.peak_tool_displacement * 1e3:.4g} mm, under a force along "

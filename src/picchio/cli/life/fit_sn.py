@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 from picchio.cli.app import app
 from picchio.cli.options import PICTURES, JsonOption, output
-from picchio.cli.output import console, deliver, styled, table, telling
+from picchio.cli.output import console, deliver, listed, styled, telling
 
 if TYPE_CHECKING:
-    from picchio.fatigue.sn.fit import Estimate, SNFit
+    from picchio.fatigue.sn.fit import SNFit
 
 
 @app.command()
@@ -72,22 +72,6 @@ def fit_sn(
 def _show(found: SNFit, tests: Path) -> None:
     screen = console()
     screen.print(styled(tests.name, f": {found.failures} failures, {found.run_outs} run-outs"))
-    limit = (
-        "endurance limit in shear, median, MPa"
-        if found.knee
-        else f"strength in shear at {found.reference_cycles:.3g} cycles, median, MPa"
-    )
-    estimates: list[tuple[str, Estimate, float, str]] = [
-        ("slope", found.slope, 1.0, ".3g"),
-        *([("knee, cycles", found.knee, 1.0, ".3g")] if found.knee else []),
-        (limit, found.endurance_limit, 1e-6, ".4g"),
-        (f"the same, survival {found.design_survival:g}, MPa", found.design, 1e-6, ".4g"),
-        ("scatter of log10 strength", found.scatter, 1.0, ".3g"),
-    ]
-    rows = []
-    for name, value, factor, spec in estimates:
-        low, high = (format(end * factor, spec) for end in (value.low, value.high))
-        rows.append((name, format(value.value * factor, spec), f"{low} to {high}"))
-    screen.print(table(("", ">value", f">{100 * found.level:g} % interval"), rows))
+    screen.print(listed(found._listing(), ""))
     for line in found.assumptions:
         screen.print(f"  - {line}", style="dim")

@@ -27,13 +27,12 @@ from picchio.cli.options import (
 from picchio.cli.output import (
     console,
     deliver,
+    listed,
     notice_first,
     progress,
     styled,
-    table,
     telling,
 )
-from picchio.core import spoken
 from picchio.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -200,7 +199,7 @@ def _places(
 
 
 def _show(summary: dict[str, Any]) -> None:
-    from picchio.robot.units import column, units_of
+    from picchio.studies.maps.result import listing_of
 
     out = console()
     for note in summary["notes"]:
@@ -212,49 +211,8 @@ def _show(summary: dict[str, Any]) -> None:
         f"  {summary['excitation']}; {summary['response']}, "
         f"{along.get(summary['direction'], 'along ' + summary['direction'])}"
     )
-    # Stresses rank joints; of drives, shares of what they bear; else torques.
-    stresses = [joint["peak_shear_stress"] for joint in summary["joints"]]
-    limit = "most stress" if None not in stresses else "most torque"
-    if summary["estimated"]:
-        limit = "nearest to\nits limit"
-    units = [units_of(joint["kind"]) for joint in summary["joints"]]
-
-    def told(joint: dict[str, Any], key: str, scale: float) -> str:
-        if "estimate" not in joint:
-            return spoken.number(scale * joint[key])
-        ends = joint["estimate"][key]
-        return spoken.between((scale * ends["P10"], scale * ends["P90"]))
-
-    small, peaks = column(
-        [u.small for u in units],
-        [told(joint, "peak_deflection", 1e3) for joint in summary["joints"]],
-    )
-    load, torques = column(
-        [u.load for u in units], [told(joint, "peak_torque", 1.0) for joint in summary["joints"]]
-    )
-    heads = ["joint", f">largest\ndeflection\n{small}", f">torque\nthere\n{load}", ">where\nm",
-             f">{limit},\n% of\nposes"]  # fmt: skip
-    stressed = any(stress is not None for stress in stresses)
-    if stressed:
-        heads.insert(3, ">stress\nthere\nMPa")
-    if counted:
-        heads.append(">damage of\na rivet,\nat most")
-    rows = []
-    for k, joint in enumerate(summary["joints"]):
-        stress, damage = joint["peak_shear_stress"], joint.get("damage_per_rivet")
-        cells = [
-            joint["name"],
-            peaks[k],
-            torques[k],
-            *(["-" if stress is None else spoken.number(stress / 1e6)] if stressed else []),
-            ", ".join(f"{round(c, 3) + 0.0:.3f}" for c in joint.get("estimate", joint)["position"]),
-            f"{100 * joint['limits_poses'] / summary['poses']:.1f}",
-        ]
-        rows.append(
-            [*cells, "-" if damage is None else spoken.number(damage, least=0.0)][: len(heads)]
-        )
-    title = "P10 to P90, where P90 is largest" if "estimate" in summary["joints"][0] else None
-    out.print(table(heads, rows, title=title))
+    title = "P10 to P90, where P90 is largest" if "estimate" in summary["joints"][0] else ""
+    out.print(listed(listing_of(summary), title))
     if counted:
         none = all(joint.get("damage_per_rivet", 0.0) == 0.0 for joint in summary["joints"])
         out.print(

@@ -23,10 +23,10 @@ from picchio.cli.options import (
 from picchio.cli.output import (
     console,
     deliver,
+    listed,
     notice_first,
     progress,
     styled,
-    table,
 )
 from picchio.core import spoken
 from picchio.robot.annotations.flexibility import estimate_notice
@@ -125,20 +125,8 @@ def _show(found: Placement, off: float) -> None:
             out.print(f"  a blow every {1e3 * found.best.spot.period:.4g} ms")
     else:
         out.print("  nothing better than where the work is now was found")
-    rows = [
-        (
-            now.name,
-            spoken.count(now.rivets_to_failure),
-            spoken.per_cent(now.utilisation),
-            spoken.count(then.rivets_to_failure),
-            spoken.per_cent(then.utilisation),
-        )
-        for now, then in zip(found.start.joints, found.best.joints, strict=True)
-    ]
-    heads = ("joint", ">rivets,\nnow", ">utilisation,\nnow, %", ">rivets,\nbest",
-             ">utilisation,\nbest, %")  # fmt: skip
-    title = "At the stated values, which are uncertain" if found.sure else None
-    out.print(table(heads, rows, title=title))
+    title = "At the stated values, which are uncertain" if found.sure else ""
+    out.print(listed(found._listing(), title))
     if found.moved and found.explained():
         out.print(found.explained())
     if found.sure:

@@ -25,11 +25,11 @@ from picchio.cli.output import (
     count_of,
     deliver,
     details,
+    listed,
     notice_first,
     progress,
     say_warning,
     styled,
-    table,
     to_write,
     write_report,
 )
@@ -160,18 +160,7 @@ def _show(found: Count, task: Task) -> None:
         out.print(f"Blows as seen: {spoken.number(peak)} N, {wide}{rate}, in the mean.")
     for change in found.changes:
         out.print(styled("changed: ", change["words"], style="bold yellow"))
-    rows = []
-    for joint in found.joints():
-        left = joint["blows_left"]
-        rows.append((
-            joint["name"], spoken.per_cent(joint["damage"]),
-            spoken.between(joint["damage_interval"] or [None], spoken.per_cent),
-            *("-" if left is None else spoken.count(left[p]) for p in ("p10", "p50", "p90")),
-            found.reached(left) or "-",
-        ))  # fmt: skip
-    heads = ("joint", ">life\nused, %", ">90 % interval,\n%", ">blows left,\nP10", ">P50", ">P90",
-             ">P50 is\nreached")  # fmt: skip
-    out.print(table(heads, rows, title="Life used and left"))
+    out.print(listed(found._listing()))
     for name, why in found.refused:
         out.print(styled(f"not counted: {name}", f": {why}", style="bold yellow"))
     for note in found.notes:

@@ -13,10 +13,11 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from picchio.core import spoken
 from picchio.core.arrays import FloatArray, as_floats
 from picchio.core.errors import InputError, warn_user
 from picchio.core.fitted import Fit, FittedValue
-from picchio.core.html import sheet
+from picchio.core.listing import Key, Listing
 from picchio.core.processes import one_thread
 from picchio.core.results import TableResult
 from picchio.fatigue.sn.curve import SNCurve
@@ -126,18 +127,25 @@ class SNFit(TableResult, Fit):
         if self.knee is None:
             yield FittedValue("knee", math.inf, math.nan, "cycles", vary=False)
 
-    def _repr_html_(self) -> str:
+    def _listing(self) -> Listing:
+        """What was fitted, each with its interval."""
+        limit = "endurance limit in shear, median [MPa]"
+        if not self.knee:
+            limit = f"strength in shear at {self.reference_cycles:.3g} cycles, median [MPa]"
         told = {
-            "slope k": (self.slope, 1.0),
+            "slope": (self.slope, 1.0),
             "knee [cycles]": (self.knee, 1.0),
-            "endurance limit, median [MPa]": (self.endurance_limit, 1e-6),
-            f"the same at {100 * self.design_survival:g} % survival [MPa]": (self.design, 1e-6),
+            limit: (self.endurance_limit, 1e-6),
+            f"the same, survival {self.design_survival:g} [MPa]": (self.design, 1e-6),
             "scatter of log10 strength": (self.scatter, 1.0),
         }
-        rows = [(name, e.value * f, e.low * f, e.high * f) for name, (e, f) in told.items() if e]
-        columns = ("", "best", f"{100 * self.level:g} % from", "to")
-        note = "; ".join(self.assumptions)
-        return sheet("S-N fit", None, columns, rows, note, self._headline())
+        rows = [(name, e.value * f, (e.low * f, e.high * f)) for name, (e, f) in told.items() if e]
+        columns: dict[str, Key] = {
+            "": lambda row: row[0],
+            "value": lambda row: row[1],
+            f"{100 * self.level:g} % interval": lambda row: spoken.between(row[2]),
+        }
+        return Listing.of("S-N fit", rows, columns, note="; ".join(self.assumptions))
 
     def curve(self, survival: float = 0.5, name: str = "fitted") -> SNCurve:
         """The fitted curve as an `SNCurve`, moved to a probability of survival.

@@ -15,7 +15,7 @@ import numpy as np
 from picchio.core import spoken
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
-from picchio.core.html import sheet
+from picchio.core.listing import InUnit, Key, Listing
 from picchio.core.processes import one_thread
 from picchio.core.results import TableResult
 from picchio.core.shown import seeing
@@ -279,16 +279,39 @@ class AllowableLoads(TableResult):
     def _headline(self) -> str:
         return self.answer
 
-    def _repr_html_(self) -> str:
-        rows = [
-            (j.joint, j.life, j.force_factor, j.governed_by or None, j.hits, 1e3 * j.radius,
-             j.reducer)
-            for j in self.joints
-        ]  # fmt: skip
-        columns = ("joint", "life now [rivets]", "force factor", "by", "most hits",
-                   "least radius [mm]", "least reducer")  # fmt: skip
-        facts = {"target life [rivets]": self.joints[0].rivets, "survival": self.joints[0].survival}
-        return sheet("Allowable loads", facts, columns, rows, head=self.answer)
+    def _listing(self) -> Listing:
+        return listing_of(self.joints, held=self.held)
+
+
+def listing_of(
+    joints: Sequence[Allowable], loads: Mapping[str, str] | None = None, held: float | None = None
+) -> Listing:
+    """What a wanted life allows, as people read it.
+
+    Args:
+        joints: what it allows each.
+        loads: {joint: unit of its torque} where not all are N m.
+        held: as in `AllowableLoads`.
+
+    Returns:
+        a row a joint.
+    """
+    units, first = loads or {}, joints[0]
+    sure = "" if first.survival is None else f", survival {first.survival:g}"
+    sure += "" if held is None else ", at the stated values"
+    unlimited = lambda j: spoken.UNLIMITED if j.hits is None else j.hits  # noqa: E731
+    columns: dict[str, Key] = {
+        "joint": "joint",
+        "rivets as it is": lambda j: spoken.count(j.life),
+        "force times": lambda j: None if j.met is None else j.force_factor,
+        "by its": lambda j: j.governed_by or None,
+        "hits a rivet": lambda j: None if j.met is None else unlimited(j),
+        "shaft radius at least [mm]": lambda j: 1e3 * j.radius,
+        "peak torque": lambda j: InUnit(j.peak_torque, units.get(j.joint, "N m")),
+        "smallest reducer": "reducer",
+    }
+    title = f"What a life of {spoken.count(first.rivets)} rivets{sure} allows"
+    return Listing.of(title, joints, columns)
 
 
 @one_thread()

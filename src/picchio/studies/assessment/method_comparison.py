@@ -9,8 +9,10 @@ from functools import partial
 
 import numpy as np
 
+from picchio.core import spoken
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import held_back
+from picchio.core.listing import Key, Listing
 from picchio.fatigue.miner import life
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.fatigue.sn.library import DEFAULT_SN_CURVE, PAPER_SN_CURVE, load_sn_curve
@@ -40,6 +42,24 @@ class Term:
     limiting_joint: str | None
     against: str | None
     factor: float
+
+
+def terms_listing(terms: Iterable[Term]) -> Listing:
+    """The terms as people read them.
+
+    Args:
+        terms: from the paper's method on.
+    """
+    title = "How far the paper's method is from the default one, an assumption at a time"
+    columns: dict[str, Key] = {
+        "term": "name",
+        "rivets to failure": lambda t: spoken.count(t.rivets_to_failure),
+        "first to fail": "limiting_joint",
+        "times the life": lambda t: t.factor if math.isfinite(t.factor) else "",
+        "of": lambda t: (t.against or "") if math.isfinite(t.factor) else "",
+        "what changes": "what",
+    }
+    return Listing.of(title, terms, columns)
 
 
 def compare_methods(robot: ModelLike, task: Task, sn_curve: SNCurve) -> tuple[Term, ...]:

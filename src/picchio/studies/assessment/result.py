@@ -13,14 +13,15 @@ import numpy as np
 from picchio.core import spoken
 from picchio.core.arrays import FloatArray, TextArray
 from picchio.core.errors import InputError
-from picchio.core.html import sheet
+from picchio.core.html import listed, sheet
+from picchio.core.listing import InUnit, Key, Listing
 from picchio.core.results import TableResult
 from picchio.core.shown import named_function
 from picchio.fatigue.standstill import RISKS, FalseBrinelling
 from picchio.robot.annotations.flexibility import estimate_notice
 from picchio.robot.joint import ESTIMATED_DRIVE
 from picchio.robot.ratings import TorqueLimit
-from picchio.robot.units import JointUnits, column, units_of
+from picchio.robot.units import JointUnits, units_of
 from picchio.studies.assessment.verdict import Verdict, judge
 
 if TYPE_CHECKING:
@@ -432,23 +433,73 @@ class Assessment(TableResult):
         # Unknown ratios are NaN and share a risk of their own, so they do not disturb the order.
         return tuple(sorted(found, key=lambda e: (RISKS.index(e["risk"]), -e["ratio"])))
 
-    def intervals(self) -> tuple[str, list[tuple[str, ...]]]:
-        """The joints of a robot whose drives are estimates, as people read them: P10 to P90 only.
+    def _listing(self) -> Listing:
+        """The joints; of a robot whose drives are estimates as people may know them: P10 to P90."""
+        if self.notice:
+            title = "The joints, 80 % ranges (gravity and blows together)"
+            columns: dict[str, Key] = {
+                "joint": "name",
+                "rivets to failure": lambda j: j.told_life if j.worn else "unknown",
+                "utilisation: torque [%]": lambda j: j.told_percent("reducer_utilisation"),
+                "in fatigue [%]": lambda j: j.told_percent("utilisation"),
+                "ends first [%]": lambda j: spoken.number(100.0 * j.ends_first, 2),
+                "torque": lambda j: InUnit(j.told_interval("peak_torque"), j.units.load),
+            }
+        else:
+            title = "The joints"
+            columns = {
+                "joint": "name",
+                "peak deflection": lambda j: InUnit(1e3 * j.peak_deflection, j.units.small),
+                "peak torque": lambda j: InUnit(j.peak_torque, j.units.load),
+                "gravity torque": lambda j: InUnit(j.gravity_torque, j.units.load),
+            }
+            if any(joint.sn_curve for joint in self.joints):
+                title = "Life of the joints"
+                columns |= {
+                    "peak stress [MPa]": lambda j: j.peak_shear_stress / 1e6,
+                    "gravity stress [MPa]": lambda j: j.gravity_shear_stress / 1e6,
+                    "utilisation [%]": lambda j: j.told_percent("utilisation"),
+                    "damage a rivet": lambda j: (
+                        spoken.number(j.damage_per_rivet, least=0.0) if j.sn_curve else None
+                    ),
+                    "rivets to failure": lambda j: j.told_life if j.sn_curve else "unknown",
+                }
+            if any(joint.reducer for joint in self.joints):
+                columns["reducer [%]"] = lambda j: j.told_percent("reducer_utilisation")
+        columns["worst at"] = lambda j: f"{j.worst_operation}, pose {j.worst_pose + 1}"
+        return Listing.of(title, self.joints, columns, bold=self.verdict.joint)
 
-        Returns:
-            the unit of the torques, and a row a joint: its name, rivets to failure, utilisation
-            by peak torque and in fatigue, in %, in how many % of the cases it ends the robot's
-            life, and the peak torque of gravity and blows together.
-        """
-        joints = self.joints
-        load, torques = column([j.units.load for j in joints],
-                               [j.told_interval("peak_torque") for j in joints])  # fmt: skip
-        return load, [
-            (j.name, j.told_life if j.worn else "unknown", j.told_percent("reducer_utilisation"),
-             j.told_percent("utilisation"),
-             "-" if math.isnan(j.ends_first) else f"{100 * j.ends_first:.0f}", torque)
-            for j, torque in zip(joints, torques, strict=True)
-        ]  # fmt: skip
+    def _reducers(self) -> Listing:
+        """The reducers, and the limit of each that binds."""
+        worn = [joint for joint in self.joints if joint.reducer]
+        columns: dict[str, Key] = {
+            "joint": "name",
+            "reducer": "reducer",
+            "the limit that binds": lambda j: j.reducer_governed_by or None,
+            "torque [N m]": lambda j: j.reducer_governing and j.reducer_governing.torque,
+            "limit [N m]": lambda j: j.reducer_governing and j.reducer_governing.limit,
+            "utilisation [%]": lambda j: j.told_percent("reducer_utilisation"),
+        }
+        return Listing.of("The reducers", worn, columns)
+
+    def _steady(self) -> Listing:
+        """The paper's steady state against a rivet as it happens."""
+        title = "The paper's steady state against a rivet as it happens\n(largest over the task"
+        units = {joint.name: joint.units.small for joint in self.joints}
+        columns: dict[str, Key] = {
+            "joint": "joint",
+            "steady peak": lambda c: InUnit(1e3 * c.steady_peak, units[c.joint]),
+            "rivet's peak": lambda c: InUnit(1e3 * c.rest_peak, units[c.joint]),
+            "ratio": "peak_ratio",
+        }
+        if any(not math.isnan(check.paper_life) for check in self.steady_state):
+            title += "; the paper's S-N curve on both"
+            columns |= {
+                "rivets, steady, one cycle a hit": lambda c: spoken.count(c.paper_life),
+                "rivets, from rest, counted": lambda c: spoken.count(c.counted_life),
+                "ratio of the lives": "life_ratio",
+            }
+        return Listing.of(f"{title})", self.steady_state, columns)
 
     def _headline(self) -> str:
         return f"{self.robot!r}, method={self.method!r}: {self.verdict.headline}"
@@ -470,37 +521,15 @@ class Assessment(TableResult):
         doubts = f"Doubts: {len(told.reasons)}." if told.reasons else ""
         head = " ".join(filter(None, [told.headline, doubts]))
         facts = {"method": self.method, "S-N curve": self.sn_curve or None}
+        title, shown = f"Assessment of {self.robot}", self._listing()
         if self.notice:
-            load, cells = self.intervals()
-            heads = ["joint", "rivets to failure", "peak torque, of its limit [%]",
-                     "utilisation in fatigue [%]", "ends first [% of cases]",
-                     f"peak torque [{load}]"]  # fmt: skip
-            title = f"Assessment of {self.robot}, estimated: P10 to P90"
-            return sheet(title, facts, heads, cells, note, f"{self.notice}. {head}")
-        joints = self.joints
-        small, peaks = column([j.units.small for j in joints],
-                              [f"{1e3 * j.peak_deflection:.4g}" for j in joints])  # fmt: skip
-        load, torques = column([j.units.load for j in joints],
-                               [f"{j.peak_torque:.4g}" for j in joints])  # fmt: skip
-        table: dict[str, list[Any]] = {
-            "joint": [j.name for j in joints],
-            f"peak deflection [{small}]": peaks,
-            f"peak torque [{load}]": torques,
-        }
-        if any(j.sn_curve for j in joints):
-            table |= {
-                "peak stress [MPa]": [1e-6 * j.peak_shear_stress for j in joints],
-                "utilisation [%]": [j.told_percent("utilisation") for j in joints],
-                "damage a rivet": [j.damage_per_rivet for j in joints],
-                "rivets to failure": [j.told_life for j in joints],
-            }
-        if any(j.reducer for j in joints):
-            table["reducer utilisation [%]"] = [
-                j.told_percent("reducer_utilisation") for j in joints
-            ]
-            table["reducer's limit"] = [j.reducer_governed_by for j in joints]
-        rows = zip(*table.values(), strict=True)
-        return sheet(f"Assessment of {self.robot}", facts, list(table), rows, note, head)
+            title, head = f"{title}, estimated: P10 to P90", f"{self.notice}. {head}"
+        names = [
+            each.name
+            for each in shown.columns
+            if each.name not in ("gravity torque", "gravity stress", "worst at")
+        ]
+        return sheet(title, facts, *listed(shown.only(*names)), note, head)
 
     def _content(self) -> dict[str, Any]:
         hidden = ("doubts", "uncertainty", "task_note", "left_out", "refused", "impossible",

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from picchio.core import spoken
 from picchio.core.errors import InputError
-from picchio.core.html import sheet
+from picchio.core.listing import InUnit, Key, Listing
 from picchio.core.results import TableResult
-from picchio.robot.units import column, units_of
+from picchio.robot.units import units_of
 from picchio.studies.maps.chunk import LEVELS
 from picchio.studies.maps.stored import attribute_of, values_of
 from picchio.vibration.closed_form.response import described
@@ -127,29 +128,17 @@ class WorkspaceMap(TableResult):
         robot = attribute_of(self.dataset, "robot")
         return f"{robot!r}: {_count(self.dataset)} poses in {self.path}"
 
-    def _repr_html_(self) -> str:
-        content = self._content()
-        joints = content["joints"]
-        units = [units_of(j["kind"]) for j in joints]
-        small, peaks = column([u.small for u in units],
-                              [f"{1e3 * j['peak_deflection']:.4g}" for j in joints])  # fmt: skip
-        load, torques = column([u.load for u in units],
-                               [f"{j['peak_torque']:.4g}" for j in joints])  # fmt: skip
-        columns = ("joint", f"largest deflection [{small}]", f"torque there [{load}]",
-                   "stress there [MPa]", "where [m]", "limits [poses]")  # fmt: skip
-        rows = [
-            (j["name"], peaks[k], torques[k], 1e-6 * j["peak_shear_stress"], j["position"],
-             j["limits_poses"])
-            for k, j in enumerate(joints)
-        ]  # fmt: skip
-        facts = {
-            key: content[key] for key in ("file", "excitation", "response", "direction", "poses")
-        }
-        most = max(range(len(joints)), key=lambda k: joints[k]["peak_deflection"])
-        size = f"{1e3 * joints[most]['peak_deflection']:.4g} {units[most].small}"
-        head = f"{content['poses']} poses; {joints[most]['name']} most, {size}"
-        return sheet(f"Workspace map of {content['robot']}", facts, columns, rows,
-                     ". ".join(content["notes"]), head)  # fmt: skip
+    def _listing(self) -> Listing:
+        content = self.to_dict()
+        worst = max(content["joints"], key=lambda joint: float(joint["peak_deflection"]))
+        size = f"{1e3 * worst['peak_deflection']:.4g} {units_of(worst['kind']).small}"
+        facts = ("file", "excitation", "response", "direction", "poses")
+        return replace(
+            listing_of(content),
+            facts={key: content[key] for key in facts},
+            note=". ".join(content["notes"]),
+            head=f"{content['poses']} poses; {worst['name']} most, {size}",
+        )
 
     def _likely(self, best: list[dict[str, Any]], first: int, rows: slice) -> None:
         """Of an estimated robot, where each joint's P90 is largest: its quantiles there."""
@@ -230,3 +219,53 @@ class WorkspaceMap(TableResult):
             "estimated": bool(found.attrs.get("estimated", 0)),
             "notes": [note for note in attribute_of(found, "notes", list) if note],
         }
+
+
+def listing_of(content: Mapping[str, Any]) -> Listing:
+    """Where each joint is deflected most, and how often it limits the robot.
+
+    Args:
+        content: of a map, as JSON has it.
+
+    Returns:
+        a row a joint.
+    """
+    joints = content["joints"]
+    # Stresses rank joints; of drives, shares of what they bear; else torques.
+    stressed = [joint["peak_shear_stress"] is not None for joint in joints]
+    limit = "most stress" if all(stressed) else "most torque"
+    if content["estimated"]:
+        limit = "nearest to its limit"
+
+    def told(joint: Mapping[str, Any], key: str, scale: float) -> float | str:
+        if "estimate" not in joint:
+            return float(scale * joint[key])
+        ends = joint["estimate"][key]
+        return spoken.between((scale * ends["P10"], scale * ends["P90"]))
+
+    def small(joint: Mapping[str, Any]) -> InUnit:
+        return InUnit(told(joint, "peak_deflection", 1e3), units_of(joint["kind"]).small)
+
+    def load(joint: Mapping[str, Any]) -> InUnit:
+        return InUnit(told(joint, "peak_torque", 1.0), units_of(joint["kind"]).load)
+
+    columns: dict[str, Key] = {
+        "joint": "name",
+        "largest deflection": small,
+        "torque there": load,
+    }
+    if any(stressed):
+        columns["stress there [MPa]"] = lambda j: _scaled(j["peak_shear_stress"], 1e-6)
+    columns["where [m]"] = lambda j: ", ".join(
+        f"{round(c, 3) + 0.0:.3f}" for c in j.get("estimate", j)["position"]
+    )
+    columns[f"{limit} [% of poses]"] = lambda j: f"{100 * j['limits_poses'] / content['poses']:.1f}"
+    if content["hits_of_damage"]:
+        columns["damage of a rivet, at most"] = lambda j: spoken.number(
+            j.get("damage_per_rivet"), least=0.0
+        )
+    return Listing.of(f"Workspace map of {content['robot']}", joints, columns)
+
+
+def _scaled(value: float | None, scale: float) -> float | None:
+    return None if value is None else scale * value

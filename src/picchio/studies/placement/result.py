@@ -7,8 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from picchio.core import spoken
 from picchio.core.arrays import FloatArray
-from picchio.core.html import sheet
+from picchio.core.listing import Listing
 from picchio.core.results import TableResult
 from picchio.studies.placement.search import Spot
 from picchio.studies.placement.sureness import Sureness
@@ -225,19 +226,22 @@ class Placement(TableResult):
             f"{self.parts['poses'].words}; {place} gives, over these, {self.parts['place'].words}."
         )
 
-    def _repr_html_(self) -> str:
-        from picchio.core import spoken
-
-        rows = [
-            (a.name, spoken.count(a.rivets_to_failure), 100 * a.utilisation,
-             spoken.count(b.rivets_to_failure), 100 * b.utilisation)
-            for a, b in zip(self.start.joints, self.best.joints, strict=True)
-        ]  # fmt: skip
-        columns = ("joint", "rivets, now", "utilisation [%]", "rivets, best", "utilisation [%]")
-        facts = {"work moved by [m, rad]": self.best.spot.move}
+    def _listing(self) -> Listing:
+        both = zip(self.start.joints, self.best.joints, strict=True)
         told = [self.explained(), self.sure.words() if self.sure else ""]
-        note = " ".join(filter(None, told))
-        return sheet("Placement of the work", facts, columns, rows, note, self._headline())
+        return Listing.of(
+            "Placement of the work",
+            both,
+            {
+                "joint": lambda pair: pair[0].name,
+                "rivets, now": lambda pair: spoken.count(pair[0].rivets_to_failure),
+                "utilisation, now [%]": lambda pair: spoken.per_cent(pair[0].utilisation),
+                "rivets, best": lambda pair: spoken.count(pair[1].rivets_to_failure),
+                "utilisation, best [%]": lambda pair: spoken.per_cent(pair[1].utilisation),
+            },
+            facts={"work moved by [m, rad]": self.best.spot.move},
+            note=" ".join(filter(None, told)),
+        )
 
     def _headline(self) -> str:
         if not self.moved:

@@ -14,8 +14,8 @@ from picchio.fatigue.sn.curve import SNCurve
 from picchio.fatigue.sn.library import load_sn_curve
 from picchio.model.model import ModelLike
 from picchio.robot.flexible_robot import FlexibleRobot
-from picchio.studies.assessment.backwards import Allowable, AllowableLoads
-from picchio.studies.assessment.method_comparison import Term
+from picchio.studies.assessment.backwards import Allowable, AllowableLoads, listing_of
+from picchio.studies.assessment.method_comparison import Term, terms_listing
 from picchio.studies.assessment.result import Assessment
 from picchio.studies.comparison import listed
 from picchio.studies.envelopes import envelope
@@ -243,6 +243,7 @@ def assessment_report(
     life = assessment.joint(worst.joint.name)
     curve = _curve(sn_curve, robot, life.sn_curve)
     told = assessment.verdict
+    loads = {joint.name: joint.units.load for joint in assessment.joints}
     answer = allowed if isinstance(allowed, AllowableLoads) else None
     varied = sorted(spread.inputs, key=lambda n: -spread.robot.shares[n]) if spread else []
     unvaried = [name for name in varied if spread and spread.robot.shares[name] < _LITTLE]
@@ -253,6 +254,7 @@ def assessment_report(
         robot=robot,
         task=task,
         life=life,
+        joints=assessment._listing(),
         curve=curve,
         figures=_figures(assessment, worst, curve, spread),
         traces=traces_html(_traces(worst, robot), "The worst rivet, joint by joint"),
@@ -263,13 +265,15 @@ def assessment_report(
         entered=listed(assessment.inputs),
         materials=_materials(assessment, robot, sn_curve),
         reducers=any(joint.reducer for joint in assessment.joints),
-        allowed=list(allowed),
+        allowed=listing_of(list(allowed), loads, answer.held if answer else None)
+        if allowed
+        else None,
         answer=answer,
         spread=spread,
         varied=[name for name in varied if name not in unvaried],
         unvaried=unvaried,
         spread_rows=[*spread.joints.items(), ("robot", spread.robot)] if spread else [],
-        terms=list(terms),
+        terms=terms_listing(terms) if terms else None,
         shafts=any(joint.sn_curve for joint in assessment.joints),
         warnings=[
             line

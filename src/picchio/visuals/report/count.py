@@ -31,16 +31,6 @@ def count_page(found: Count, *, command: str | None = None, warnings: Sequence[s
         the HTML.
     """
     names = found.model.robot.flexible_names
-    joints = found.joints()
-    rows = []
-    for joint in joints:
-        left = joint["blows_left"]
-        rows.append([
-            joint["name"], spoken.per_cent(joint["damage"]),
-            spoken.between(joint["damage_interval"] or [None], spoken.per_cent),
-            *("-" if left is None else spoken.count(left[p]) for p in ("p10", "p50", "p90")),
-            found.reached(left) or "-",
-        ])  # fmt: skip
     first = found.first_to_fail
     places = [
         [", ".join(f"{v:.3f}" for v in s["pose"]),
@@ -61,7 +51,7 @@ def count_page(found: Count, *, command: str | None = None, warnings: Sequence[s
         facts.append(["With blows 10 % weaker", f"{gain:.3g} times as long"])
     return render(
         "count.html.j2", robot=found.model.robot.name, headline=found._headline() + ".",
-        facts=facts, rows=rows, pictures=_pictures(found), places=places,
+        facts=facts, life=found._listing(), pictures=_pictures(found), places=places,
         place_heads=["Pose|rad", "Force along", "Blows",
                      *(f"{name}|% of its damage" for name in names)],
         changes=[change["words"] for change in found.changes],

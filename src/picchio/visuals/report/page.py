@@ -18,6 +18,7 @@ from matplotlib.axes import Axes
 from picchio.core import spoken
 from picchio.core.errors import InputError
 from picchio.core.html import Page
+from picchio.core.listing import plainly
 from picchio.core.provenance import package_version
 from picchio.core.results import Result
 from picchio.core.shown import named_function
@@ -88,6 +89,8 @@ def page_environment(package: str = "picchio.visuals.report") -> Environment:
         loader=PackageLoader(package, "page_files"),
     )
     environment.filters.update(number=number, percent=percent, count=spoken.count)
+    environment.filters["typeset"] = typeset
+    environment.globals["plainly"] = plainly
     style = files("picchio.visuals.report") / "page_files" / "style.css"
     environment.globals["style"] = Markup(style.read_text("utf-8"))
     return environment
@@ -133,15 +136,22 @@ class Pictures:
         return Picture(inline_svg(ax, alt, f"{self.PREFIX}{self._made}", themed=True), caption)
 
 
+_TOLD = re.compile(r"-?[\d,.]+(e-?\d+)?")
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def number(value: float | None, digits: int = spoken.DIGITS) -> str:
     """A number as on a terminal, with a true minus, a true dash and raised powers of ten."""
-    text = spoken.number(value, digits)
+    return typeset(spoken.number(value, digits))
+
+
+def typeset(text: str) -> str:
+    """The same, where it is told already; words stay as they are."""
     if text == "-":
         return "\N{EN DASH}"
-    mantissa, e, power = text.partition("e") if text[-1].isdigit() else (text, "", "")
+    if not _TOLD.fullmatch(text):
+        return text
+    mantissa, e, power = text.partition("e")
     raised = f" × 10{power.translate(_RAISED)}" if e else ""
     return mantissa.replace("-", "\N{MINUS SIGN}") + raised
 
