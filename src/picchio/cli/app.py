@@ -9,6 +9,7 @@ import textwrap
 import tomllib
 from collections.abc import Callable
 from copy import copy
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Annotated, Any, get_origin
 
@@ -114,22 +115,37 @@ def _declared(
 
 class _App(typer.Typer):
     def command(self, name: str | None = None, **options: Any) -> Any:
-        """Every command takes `-v`; its docstring says what its other options are."""
+        """Every command takes `-v`; its docstring says what its other options are.
+
+        A parameter that is a dataclass stands for its fields, options that go together.
+        """
         register = super().command(name, **{"cls": _Command} | options)
 
         def added(function: Callable[..., Any]) -> Callable[..., Any]:
             @functools.wraps(function)
             def told(*, verbose: bool, **given: Any) -> Any:
                 show_all(verbose)
+                for name, kind in groups.items():
+                    made = kind(**{each.name: given.pop(each.name) for each in fields(kind)})
+                    given[name] = made
                 return function(**given)
 
             own = inspect.signature(function, eval_str=True)
+            groups: dict[str, Any] = {
+                name: each.annotation
+                for name, each in own.parameters.items()
+                if is_dataclass(each.annotation)
+            }
             told.__doc__, listed = _described(function)
-            every = [
-                _declared(each, *listed.get(each.name, ())) for each in own.parameters.values()
-            ]
+            every = []
+            for name, each in own.parameters.items():
+                parts = [each]
+                if name in groups:
+                    parts = [*inspect.signature(groups[name], eval_str=True).parameters.values()]
+                every += [_declared(part, *listed.get(part.name, ())) for part in parts]
             every.append(inspect.Parameter("verbose", inspect.Parameter.KEYWORD_ONLY, default=False,
                                            annotation=_VERBOSE))  # fmt: skip
+            every.sort(key=lambda each: (each.kind, each.default is not each.empty))
             told.__annotations__ = {each.name: each.annotation for each in every}
             vars(told)["__signature__"] = own.replace(parameters=every)
             register(told)

@@ -5,15 +5,20 @@ from __future__ import annotations
 import os
 import re
 import shlex
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from picchio.cli.app import BLOWS, OUTPUT, ROBOT
 from picchio.cli.output import folder_to_write, to_write
 from picchio.core.errors import InputError
+
+if TYPE_CHECKING:
+    from picchio.excitation.excitation import Excitation
+    from picchio.robot.flexible_robot import FlexibleRobot
 
 
 def output(
@@ -125,6 +130,30 @@ ReducersOption = Annotated[
         "shipped; may be repeated.",
     ),
 ]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobotGiven:
+    """A robot as it is typed: its name, and the files that go with it."""
+
+    robot: RobotArgument
+    flex: FlexOption = None
+    tool: ToolOption = None
+    reducers: ReducersOption = None
+
+    def load(self, **how: Any) -> FlexibleRobot:
+        """The robot.
+
+        Args:
+            **how: of `picchio.load_robot`, besides.
+        """
+        from picchio.robot.loading.load import load_robot
+
+        return load_robot(
+            self.robot, flex=self.flex, tool=self.tool, reducers=self.reducers or (), **how
+        )
+
+
 TaskOption = Annotated[
     Path | None,
     _blows(
@@ -166,6 +195,28 @@ PeriodOption = Annotated[
     _blows(help="Time from one blow to the next, s; likewise."),
 ]
 WidthOption = Annotated[float | None, _blows(help="Duration of a blow, s; likewise.")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class BlowsGiven:
+    """What is typed of the blows, in place of the task's."""
+
+    force: ForceOption = None
+    period: PeriodOption = None
+    width: WidthOption = None
+
+    def on(self, robot: FlexibleRobot, task: Path | None = None) -> Excitation:
+        """The blows.
+
+        Args:
+            robot: whose task has those that were not typed.
+            task: in place of its own.
+        """
+        from picchio.studies.tasks import blows_of
+
+        return blows_of(robot, task, **vars(self))
+
+
 HitsOption = Annotated[
     int | None,
     _blows(

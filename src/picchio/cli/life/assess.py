@@ -11,21 +11,16 @@ import typer
 from picchio.cli.app import app
 from picchio.cli.life.how_sure import parse_spreads, show_spread
 from picchio.cli.options import (
+    BlowsGiven,
     ClassOption,
-    FlexOption,
-    ForceOption,
     GravityStiffnessOption,
     JsonOption,
     PayloadOption,
-    PeriodOption,
     ReachOption,
-    ReducersOption,
     ReportOption,
-    RobotArgument,
+    RobotGiven,
     SNCurveOption,
     TaskOption,
-    ToolOption,
-    WidthOption,
 )
 from picchio.cli.output import (
     console,
@@ -53,18 +48,13 @@ if TYPE_CHECKING:
 
 @app.command()
 def assess(
-    robot: RobotArgument,
+    given: RobotGiven,
     *,
     task: TaskOption = None,
-    flex: FlexOption = None,
-    tool: ToolOption = None,
-    reducers: ReducersOption = None,
     payload: PayloadOption = None,
     reach: ReachOption = None,
     drive_class: ClassOption = None,
-    force: ForceOption = None,
-    period: PeriodOption = None,
-    width: WidthOption = None,
+    blows: BlowsGiven,
     hits: Annotated[int | None, typer.Option(min=1)] = None,
     method: str = "rainflow",
     sn_curve: SNCurveOption = None,
@@ -127,9 +117,9 @@ def assess(
         "--uncertainty": uncertainty or None,
         "--spread": spread or None,
     }
-    for key, given in rainflow_only.items():
-        if method == "paper" and given is not None:
-            raise InputError("belongs to the method rainflow", key=key, value=given)
+    for key, value in rainflow_only.items():
+        if method == "paper" and value is not None:
+            raise InputError("belongs to the method rainflow", key=key, value=value)
     if survival is not None and for_life is None:
         raise InputError("belongs to --for-life", key="--survival", value=survival)
     if survival is not None and not 0.0 < survival < 1.0:
@@ -149,11 +139,8 @@ def assess(
 
         embedded(logo)  # refused before any work
     with notice_first(json):
-        loaded = picchio.load_robot(
-            robot, flex=flex, tool=tool, reducers=reducers or (), payload=payload, reach=reach,
-            drive_class=drive_class,
-        )  # fmt: skip
-    work = task_of(loaded, task, force=force, period=period, width=width, hits=hits)
+        loaded = given.load(payload=payload, reach=reach, drive_class=drive_class)
+    work = task_of(loaded, task, hits=hits, **vars(blows))
     options: dict[str, Any] = {
         "sn_curve": sn_curve,
         "residue": residue,
@@ -191,7 +178,7 @@ def assess(
     if for_life is not None:
         with telling("what this life allows"):
             allowed = picchio.allowable(
-                loaded, work, for_life, survival=survival, reducers=reducers or (), **options
+                loaded, work, for_life, survival=survival, reducers=given.reducers or (), **options
             )
         content |= allowed.to_dict()
     cover = None

@@ -6,16 +6,11 @@ from typing import TYPE_CHECKING
 
 from picchio.cli.app import app
 from picchio.cli.options import (
-    FlexOption,
-    ForceOption,
+    BlowsGiven,
     GravityStiffnessOption,
     HitsOption,
     JsonOption,
-    PeriodOption,
-    ReducersOption,
-    RobotArgument,
-    ToolOption,
-    WidthOption,
+    RobotGiven,
     pose_given,
 )
 from picchio.cli.output import console, deliver, listed, styled
@@ -27,16 +22,11 @@ if TYPE_CHECKING:
 
 @app.command()
 def envelope(
-    robot: RobotArgument,
+    given: RobotGiven,
     *,
     pose: str | None = None,
-    force: ForceOption = None,
-    period: PeriodOption = None,
-    width: WidthOption = None,
+    blows: BlowsGiven,
     hits: HitsOption = None,
-    flex: FlexOption = None,
-    tool: ToolOption = None,
-    reducers: ReducersOption = None,
     gravity_stiffness: GravityStiffnessOption = None,
     json: JsonOption = None,
 ) -> None:
@@ -50,12 +40,12 @@ def envelope(
     """
     import picchio
     from picchio.robot.dynamics.pose import warn_beyond_limits
-    from picchio.studies.tasks import blows_of
 
-    loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
-    blows = blows_of(loaded, force=force, period=period, width=width)
+    loaded = given.load()
     at = pose_given(pose) if pose else None
-    found = picchio.envelope(loaded, at, blows, hits=hits, gravity_stiffness=gravity_stiffness)
+    found = picchio.envelope(
+        loaded, at, blows.on(loaded), hits=hits, gravity_stiffness=gravity_stiffness
+    )
     warn_beyond_limits(loaded, [found.pose], "the pose")
     deliver(found.to_dict(), json, lambda: _show(found))
 

@@ -11,12 +11,9 @@ import typer
 from picchio.cli.app import app
 from picchio.cli.ending import ending
 from picchio.cli.options import (
-    FlexOption,
     JsonOption,
-    ReducersOption,
-    RobotArgument,
+    RobotGiven,
     TaskOption,
-    ToolOption,
     output,
 )
 from picchio.cli.output import deliver, telling
@@ -24,15 +21,12 @@ from picchio.cli.output import deliver, telling
 
 @app.command()
 def explore(
-    robot: RobotArgument,
+    given: RobotGiven,
     *,
     task: TaskOption = None,
     model: Path | None = None,
     save: Annotated[Path | None, output("--save", added_to=True)] = None,
     browser: Annotated[bool, typer.Option("--open")] = False,
-    flex: FlexOption = None,
-    tool: ToolOption = None,
-    reducers: ReducersOption = None,
     json: JsonOption = None,
 ) -> None:
     """Live: drag the tool and see envelopes and life change.
@@ -47,7 +41,7 @@ def explore(
     """
     import picchio
 
-    loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
+    loaded = given.load()
     with telling("loading the robot"):
         live = picchio.explore(loaded, task=task, model=model, save=save)
     try:

@@ -11,15 +11,10 @@ from picchio.cli.app import app
 from picchio.cli.options import (
     PAGES,
     PICTURES,
-    FlexOption,
-    ForceOption,
+    BlowsGiven,
     HitsOption,
     JsonOption,
-    PeriodOption,
-    ReducersOption,
-    RobotArgument,
-    ToolOption,
-    WidthOption,
+    RobotGiven,
     numbers,
     out_beside,
     output,
@@ -44,7 +39,7 @@ if TYPE_CHECKING:
 
 @app.command("map")
 def map_(
-    robot: RobotArgument,
+    given: RobotGiven,
     *,
     out: Annotated[Path | None, output("--out")] = None,
     plane: str | None = None,
@@ -59,12 +54,7 @@ def map_(
     branch: str = "all",
     hits: HitsOption = None,
     damage: bool = False,
-    force: ForceOption = None,
-    period: PeriodOption = None,
-    width: WidthOption = None,
-    flex: FlexOption = None,
-    tool: ToolOption = None,
-    reducers: ReducersOption = None,
+    blows: BlowsGiven,
     chunk: Annotated[int | None, typer.Option(min=1)] = None,
     restart: bool = False,
     workers: Annotated[int | None, typer.Option(min=0)] = None,
@@ -101,21 +91,21 @@ def map_(
         html (FILE): The map in 3-D, to turn and to cut, as one HTML file.
     """
     import picchio
-    from picchio.studies.tasks import blows_of, hits_of_rivet
+    from picchio.studies.tasks import hits_of_rivet
 
     with notice_first(json):
-        loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
+        loaded = given.load()
     out = out or out_beside(loaded.name, "-map.nc")
     where = _places(loaded, plane, at, box, points, surface, joint_grid, spacing, bounds)
     if direction is None:
         direction = "worst" if surface is None else "normal"
     along = direction if direction in ("worst", "normal") else numbers(direction, "--direction")
-    blows = blows_of(loaded, force=force, period=period, width=width)
+    train = blows.on(loaded)
     with progress("places") as report:
         found = picchio.workspace_map(
             loaded,
             where,
-            blows,
+            train,
             out,
             direction=along,
             branch=branch,
@@ -129,7 +119,7 @@ def map_(
         )
     with found:
         summary = found.to_dict()
-        _draw(found, loaded, blows, hits, plot, html)
+        _draw(found, loaded, train, hits, plot, html)
     deliver(summary, json, lambda: _show(summary))
 
 

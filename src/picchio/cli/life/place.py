@@ -10,13 +10,10 @@ import typer
 
 from picchio.cli.app import app
 from picchio.cli.options import (
-    FlexOption,
     JsonOption,
-    ReducersOption,
-    RobotArgument,
+    RobotGiven,
     SNCurveOption,
     TaskOption,
-    ToolOption,
     numbers,
     output,
 )
@@ -37,7 +34,7 @@ if TYPE_CHECKING:
 
 @app.command()
 def place(
-    robot: RobotArgument,
+    given: RobotGiven,
     *,
     task: TaskOption = None,
     move: str | None = None,
@@ -45,9 +42,6 @@ def place(
     margin: float = 0.0,
     off: float = 0.05,
     placements: int = 400,
-    flex: FlexOption = None,
-    tool: ToolOption = None,
-    reducers: ReducersOption = None,
     sn_curve: SNCurveOption = None,
     self_collision: Annotated[bool, typer.Option("--self-collision/--no-self-collision")] = True,
     seed: Annotated[int, typer.Option(min=0)] = 0,
@@ -80,7 +74,7 @@ def place(
         far[3] = math.radians(far[3])
     rates = None if period_range is None else numbers(period_range, "--period-range", 2)
     with notice_first(json):
-        loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
+        loaded = given.load()
     work = task_of(loaded, task)
     with progress("steps of the search") as tick:
         found = picchio.place(

@@ -11,16 +11,11 @@ from picchio.cli.app import app
 from picchio.cli.ending import ending
 from picchio.cli.options import (
     PAGES,
-    FlexOption,
-    ForceOption,
+    BlowsGiven,
     GravityStiffnessOption,
     JsonOption,
-    PeriodOption,
-    ReducersOption,
-    RobotArgument,
+    RobotGiven,
     TaskOption,
-    ToolOption,
-    WidthOption,
     joint_names,
     out_beside,
     output,
@@ -35,7 +30,7 @@ if TYPE_CHECKING:
 
 @app.command()
 def view(
-    robot: RobotArgument,
+    given: RobotGiven,
     *,
     out: Annotated[Path | None, output("--out", *PAGES)] = None,
     rerun: Annotated[Path | None, output("--rerun", ".rrd")] = None,
@@ -43,15 +38,10 @@ def view(
     task: TaskOption = None,
     pose: str | None = None,
     hits: int | None = None,
-    force: ForceOption = None,
-    period: PeriodOption = None,
-    width: WidthOption = None,
+    blows: BlowsGiven,
     map_: Annotated[Path | None, typer.Option("--map")] = None,
     diagnosis: Path | None = None,
     joint: Annotated[str | None, typer.Option(autocompletion=joint_names)] = None,
-    flex: FlexOption = None,
-    tool: ToolOption = None,
-    reducers: ReducersOption = None,
     gravity_stiffness: GravityStiffnessOption = None,
     json: JsonOption = None,
 ) -> None:
@@ -71,24 +61,21 @@ def view(
         joint (NAME): The joint whose envelope is shown first.
     """
     import picchio
-    from picchio.studies.tasks import blows_of
 
-    loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
+    loaded = given.load()
     if out is None and rerun is None and not live:
         out = out_beside(loaded.name, "-scene.html")
-    blows = None
-    if pose is not None:
-        blows = blows_of(loaded, task, force=force, period=period, width=width)
-    else:
-        for key, value in (("--force", force), ("--period", period), ("--width", width)):
+    if pose is None:
+        for key, value in vars(blows).items():
             if value is not None:
-                raise InputError("needs --pose: a task says its blows itself", key=key, value=value)
+                raise InputError("needs --pose: a task says its blows itself", key=f"--{key}",
+                                 value=value)  # fmt: skip
     with progress("poses") as tell:
         scene = picchio.view(
             loaded,
             task=task,
             pose=None if pose is None else pose_given(pose),
-            excitation=blows,
+            excitation=None if pose is None else blows.on(loaded, task),
             hits=hits,
             workspace=map_,
             diagnosis=diagnosis,

@@ -11,14 +11,11 @@ import typer
 
 from picchio.cli.app import app
 from picchio.cli.options import (
-    FlexOption,
     JsonOption,
-    ReducersOption,
     ReportOption,
-    RobotArgument,
+    RobotGiven,
     SNCurveOption,
     TaskOption,
-    ToolOption,
 )
 from picchio.cli.output import (
     console,
@@ -44,15 +41,12 @@ if TYPE_CHECKING:
 
 @app.command()
 def count(
-    robot: RobotArgument,
+    given: RobotGiven,
     *,
     ledger: Path,
     log: list[Path] | None = None,
     mapping: Path | None = None,
     task: TaskOption = None,
-    flex: FlexOption = None,
-    tool: ToolOption = None,
-    reducers: ReducersOption = None,
     sn_curve: SNCurveOption = None,
     watch: bool = False,
     every: Annotated[float, typer.Option(min=0.1)] = 10.0,
@@ -82,7 +76,7 @@ def count(
     if watch and not log:
         raise InputError("needs a folder to watch", key="--log")
     with notice_first(json):
-        loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
+        loaded = given.load()
     to_write(ledger, "--ledger", added_to=True)
     before: list[tuple[str, int, int]] | None = None
     while True:

@@ -10,13 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 from picchio.cli.app import app
 from picchio.cli.options import (
     DataOption,
-    FlexOption,
     GravityStiffnessOption,
     JsonOption,
-    ReducersOption,
     ReportOption,
-    RobotArgument,
-    ToolOption,
+    RobotGiven,
     output,
 )
 from picchio.cli.output import (
@@ -39,7 +36,7 @@ if TYPE_CHECKING:
 
 @app.command()
 def diagnose(
-    robot: RobotArgument,
+    given: RobotGiven,
     *,
     data: DataOption,
     task: Path | None = None,
@@ -49,9 +46,6 @@ def diagnose(
     model: Annotated[Path | None, output("--model", ".toml")] = None,
     report: ReportOption = None,
     plan: Annotated[Path | None, output("--plan")] = None,
-    flex: FlexOption = None,
-    tool: ToolOption = None,
-    reducers: ReducersOption = None,
     gravity_stiffness: GravityStiffnessOption = None,
     json: JsonOption = None,
 ) -> None:
@@ -76,15 +70,15 @@ def diagnose(
         effect_class(name)
     campaign = picchio.load_campaign(data)
     moves = {record.kind for record in campaign} == {"motion"}
-    picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or (), allow_rigid=moves)
+    given.load(allow_rigid=moves)
     with telling("reading the data") as say:
         found = picchio.diagnose(
-            robot,
+            given.robot,
             campaign,
             task=task,
             without=without or (),
-            flex=flex,
-            tool=tool,
+            flex=given.flex,
+            tool=given.tool,
             gravity_stiffness=gravity_stiffness,
             train=train or (),
             held_out=held_out or (),

@@ -8,12 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 from picchio.cli.app import app
 from picchio.cli.options import (
     DataOption,
-    FlexOption,
     JsonOption,
-    ReducersOption,
     ReportOption,
-    RobotArgument,
-    ToolOption,
+    RobotGiven,
     output,
 )
 from picchio.cli.output import (
@@ -33,13 +30,10 @@ if TYPE_CHECKING:
 
 @app.command()
 def identify(
-    robot: RobotArgument,
+    given: RobotGiven,
     *,
     data: DataOption,
     out: Annotated[Path, output("--out")],
-    flex: FlexOption = None,
-    tool: ToolOption = None,
-    reducers: ReducersOption = None,
     report: ReportOption = None,
     json: JsonOption = None,
 ) -> None:
@@ -56,10 +50,7 @@ def identify(
     from picchio.diagnosis.identify import needs_springs
 
     campaign = picchio.load_campaign(data)
-    loaded = picchio.load_robot(
-        robot, flex=flex, tool=tool, reducers=reducers or (),
-        allow_rigid=not needs_springs(campaign),
-    )  # fmt: skip
+    loaded = given.load(allow_rigid=not needs_springs(campaign))
     with telling("reading the data") as say:
         found = picchio.identify(loaded, campaign, progress=say)
     write_text(out, found.sidecar_text())

@@ -9,13 +9,10 @@ import typer
 
 from picchio.cli.app import app
 from picchio.cli.options import (
-    FlexOption,
     JsonOption,
-    ReducersOption,
     ReportOption,
-    RobotArgument,
+    RobotGiven,
     TaskOption,
-    ToolOption,
     folder,
 )
 from picchio.cli.output import (
@@ -35,7 +32,7 @@ if TYPE_CHECKING:
 
 @app.command()
 def plan(
-    robot: RobotArgument,
+    given: RobotGiven,
     *,
     task: TaskOption = None,
     budget: str = "20min",
@@ -43,9 +40,6 @@ def plan(
     force: float | None = None,
     to: Annotated[Path | None, folder("--to")] = None,
     overwrite: bool = False,
-    flex: FlexOption = None,
-    tool: ToolOption = None,
-    reducers: ReducersOption = None,
     seed: Annotated[int, typer.Option(min=0)] = 0,
     report: ReportOption = None,
     json: JsonOption = None,
@@ -70,7 +64,7 @@ def plan(
 
     hands = [name.strip() for name in instruments.split(",") if name.strip()]
     with notice_first(json):
-        loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
+        loaded = given.load()
     work = task_of(loaded, task)
     with telling("planning") as say:
         found = picchio.plan(

@@ -9,12 +9,9 @@ import typer
 
 from picchio.cli.app import app
 from picchio.cli.options import (
-    FlexOption,
     GravityStiffnessOption,
     JsonOption,
-    ReducersOption,
-    RobotArgument,
-    ToolOption,
+    RobotGiven,
     folder,
 )
 from picchio.cli.output import console, deliver, progress
@@ -25,13 +22,10 @@ if TYPE_CHECKING:
 
 @app.command()
 def simulate(
-    robot: RobotArgument,
+    given: RobotGiven,
     *,
     plan: Path,
     to: Annotated[Path, folder("--to")],
-    flex: FlexOption = None,
-    tool: ToolOption = None,
-    reducers: ReducersOption = None,
     gravity_stiffness: GravityStiffnessOption = None,
     seed: Annotated[int | None, typer.Option(min=0)] = None,
     parquet: bool = False,
@@ -52,13 +46,13 @@ def simulate(
     """
     import picchio
 
-    loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
+    loaded = given.load()
     with progress("records") as report:
         made = picchio.simulate(
             loaded,
             plan,
             to,
-            robot_name=robot,
+            robot_name=given.robot,
             seed=seed,
             gravity_stiffness=gravity_stiffness,
             parquet=parquet,
