@@ -8,8 +8,10 @@ from dataclasses import asdict, dataclass
 from typing import Any, ClassVar
 
 from picchio.campaign.campaign import Campaign
+from picchio.core import spoken
 from picchio.core.arrays import FloatArray
 from picchio.core.fitted import Fit, FittedValue
+from picchio.core.listing import Key, Listing
 from picchio.core.results import TableResult
 from picchio.robot.flexible_robot import FlexibleRobot
 
@@ -195,6 +197,20 @@ class Identification(TableResult, Fit):
 
     def _seen(self) -> Mapping[str, Any]:
         return {"robot": self.robot}
+
+    def _listing(self) -> Listing:
+        """What the joints are, within which bounds, and whether the data say so."""
+        between = lambda one: spoken.between((one.low, one.high))  # noqa: E731
+        columns: dict[str, Key] = {
+            "joint": "name",
+            "stiffness [N m/rad, N/m]": lambda j: j.stiffness.value,
+            "90 % interval": lambda j: between(j.stiffness),
+            "determined by the data": lambda j: j.stiffness.told,
+            "damping ratio": lambda j: j.damping_ratio.value,
+            "its 90 % interval": lambda j: between(j.damping_ratio),
+            "damping determined": lambda j: j.damping_ratio.told,
+        }
+        return Listing.of("Stiffness and damping", self.joints, columns)
 
     def _rows(self) -> list[dict[str, Any]]:
         return [

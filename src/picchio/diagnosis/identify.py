@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -111,8 +111,8 @@ class Diagnosed(Identification):
         return {
             **self.diagnosis.to_dict(),
             "format": FORMAT,
-            "joints": [asdict(joint) for joint in self.joints],
-            "also": [c.to_dict() for c in self.diagnosis.causes if not _is_of(c, "stiffness")],
+            "joints": self.joints,
+            "also": [c for c in self.diagnosis.causes if not _is_of(c, "stiffness")],
             "residual": {
                 "before": self.begun.nrmse if self.begun else gain.baseline_nrmse if gain else None,
                 "after": gain.extended_nrmse if gain else None,

@@ -66,10 +66,6 @@ class Value:
     std: float
     unit: str
 
-    def to_dict(self) -> dict[str, Any]:
-        """As in JSON."""
-        return asdict(self)
-
 
 def unit_of(robot: FlexibleRobot, target: str, unit: str) -> str:
     """A parameter's unit, SI; newtons and metres where the target is a prismatic joint.
@@ -304,10 +300,6 @@ class Left:
     by_pose: Mapping[str, float]
     by_frequency: Mapping[str, float] = field(default_factory=dict)
 
-    def to_dict(self) -> dict[str, Any]:
-        """As in JSON."""
-        return asdict(self)
-
     @property
     def told(self) -> str:
         """A sentence without its stop."""
@@ -424,19 +416,19 @@ class Diagnosis(TableResult, Fit):
         return {
             "format": FORMAT,
             "verdict": self.verdict,
-            "causes": [cause.to_dict() for cause in self.causes],
+            "causes": self.causes,
             "alternatives": [[named(pair) for pair in each] for each in self.alternatives],
             "leads": [named(pair) for pair in self.leads],
-            "nuisances": {name: value.to_dict() for name, value in self.nuisances.items()},
-            "gain": self.gain.to_dict() if self.gain else None,
+            "nuisances": self.nuisances,
+            "gain": self.gain,
             "life": self.life,
             "next_measurement": self.next_measurement,
             "note": self.note or None,
-            "remainder": self.remainder.to_dict() if self.remainder else None,
+            "remainder": self.remainder,
             **more,
             **({"life_note": self.life_note} if self.life_note else {}),
             **({"untold": list(self.untold)} if self.untold else {}),
-            "not_looked_for": dict(self.not_looked_for),
+            "not_looked_for": self.not_looked_for,
             "scores": self.scores,
             **self.extra,
         }

@@ -123,7 +123,7 @@ class EffectList(TableResult):
         return f"{len(self.effects)} effects"
 
     def _content(self) -> dict[str, Any]:
-        return {"format": FORMAT, "effects": [effect.to_dict() for effect in self.effects]}
+        return {"format": FORMAT, "effects": self.effects}
 
     def _rows(self) -> list[dict[str, Any]]:
         return [

@@ -108,7 +108,7 @@ class FormatList(TableResult):
         return f"{len(self.formats)} formats: {', '.join(entry.name for entry in self.formats)}"
 
     def _content(self) -> dict[str, Any]:
-        return {"format": FORMAT, "formats": [asdict(entry) for entry in self.formats]}
+        return {"format": FORMAT, "formats": self.formats}
 
     def _rows(self) -> list[dict[str, Any]]:
         return [{"name": f.name, **asdict(key)} for f in self.formats for key in f.keys]

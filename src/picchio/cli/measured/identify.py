@@ -16,9 +16,8 @@ from picchio.cli.options import (
 from picchio.cli.output import (
     console,
     deliver,
+    listed,
     say_warning,
-    styled,
-    table,
     telling,
     write_report,
 )
@@ -62,13 +61,9 @@ def identify(
 
 def show_identified(found: Identification) -> None:
     """Print every joint's stiffness with its interval, why, and what else the answer says."""
-    out, rows = console(), []
-    for joint in found.joints:
-        k = joint.stiffness
-        mark = "yes" if k.told else styled("no", style="dim")
-        rows.append([joint.name, f"{k.value:.4g}", f"{k.low:.3g} to {k.high:.3g}", mark])
-    unit = "stiffness\nN m/rad, N/m"
-    out.print(table(("joint", f">{unit}", ">90 % interval", "determined\nby the data"), rows))
+    out = console()
+    shown = found._listing().only("joint", "stiffness", "90 % interval", "determined by the data")
+    out.print(listed(shown, ""))
     for joint in found.joints:
         out.print(f"  {joint.name}: {joint.stiffness.why}")
     for line in found.remarks:

@@ -18,13 +18,13 @@ from picchio.cli.options import (
 from picchio.cli.output import (
     console,
     deliver,
+    listed,
     notice_first,
     styled,
     table,
     telling,
     write_report,
 )
-from picchio.core import spoken
 
 if TYPE_CHECKING:
     from picchio.diagnosis.planning.plan import PlannedTests
@@ -100,11 +100,6 @@ def _show(found: PlannedTests, to: Path | None) -> None:
         out.print("Fill in the form, then:")
         out.print(styled(f"  {found.next_command(str(to))}"), soft_wrap=True)
     out.print(f"No more records: {found.choice.why}.")
-    factors = [[joint.name, *map(spoken.number, (joint.before, joint.after))]
-               for joint in found.joints]  # fmt: skip
-    out.print(table(
-        ("joint", ">now", ">then"), factors,
-        title="The stiffness lies within this factor either way (90 %)",
-    ))  # fmt: skip
+    out.print(listed(found._factors()))
     for note in found.notes:
         out.print(f"  - {note}")

@@ -8,7 +8,7 @@ import math
 import re
 import shlex
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar
@@ -21,6 +21,7 @@ from picchio.core import spoken
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.core.files import write_text
+from picchio.core.listing import Listing
 from picchio.core.processes import one_thread
 from picchio.core.provenance import provenance
 from picchio.core.registry import classes_in
@@ -217,6 +218,12 @@ class PlannedTests(TableResult):
             f"from {spoken.factor(now)} to {spoken.number(10.0**then, 2)}"
         )
 
+    def _factors(self) -> Listing:
+        """How well each stiffness is known now, and then."""
+        title = "The stiffness lies within this factor either way (90 %)"
+        columns = {"joint": "name", "now [factor]": "before", "then [factor]": "after"}
+        return Listing.of(title, self.joints, columns)
+
     def _rows(self) -> list[dict[str, Any]]:
         return [
             {"record": k, "kind": one.candidate.kind,
@@ -242,7 +249,7 @@ class PlannedTests(TableResult):
                 "deviation_after": self.choice.after, "others": math.sqrt(self.outcome.rest),
                 "interval_decades": [now, then],
             },
-            "joints": [asdict(joint) for joint in self.joints],
+            "joints": self.joints,
             "records": [
                 {"kind": one.candidate.kind, "file": file,
                  "pose": dict(zip(names, one.candidate.pose.tolist(), strict=True)),

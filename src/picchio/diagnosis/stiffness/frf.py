@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -178,7 +178,7 @@ class FrfIdentification(Identification):
             "format": FORMAT,
             "robot": self.robot.name,
             "method": ByResponses.name,
-            "joints": [asdict(joint) for joint in self.joints],
+            "joints": self.joints,
             "also": [],
             "residual": {"before": self.before, "after": self.left, "held_out": []},
             "damping": {"convention": self.convention, "evidence": self.decided},

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -135,8 +135,8 @@ class BothIdentification(Identification):
             "format": FORMAT,
             "robot": self.robot.name,
             "method": ByBoth.name,
-            "joints": [asdict(joint) for joint in self.joints],
-            "also": [cause.to_dict() for cause in self.loads.causes],
+            "joints": self.joints,
+            "also": self.loads.causes,
             "provenance": provenance([*self.robot.files, *self.campaign.files]),
         }
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -233,8 +233,8 @@ class StaticIdentification(Identification):
             "format": FORMAT,
             "robot": self.robot.name,
             "method": ByLoads.name,
-            "joints": [asdict(joint) for joint in self.joints],
-            "also": [cause.to_dict() for cause in self.causes],
+            "joints": self.joints,
+            "also": self.causes,
             "residual": {
                 "before": alone.before, "after": left.nrmse, "joints_alone": alone.nrmse,
                 "held_out": [

@@ -76,7 +76,7 @@ class RobotList(TableResult):
         return sheet(self._headline(), None, columns, rows)
 
     def _content(self) -> dict[str, Any]:
-        return {"format": "picchio-robots/1", "robots": self._rows()}
+        return {"format": "picchio-robots/1", "robots": self.entries}
 
 
 def robots(*, examples: bool = True) -> RobotList:

@@ -57,11 +57,6 @@ class Measurement:
     interval_decades: tuple[float, float]
     kept: float
 
-    def to_dict(self) -> dict[str, object]:
-        """As the JSON has it."""
-        return {"what": self.what, "words": self.words, "command": self.command,
-                "interval_decades": self.interval_decades, "kept": self.kept}  # fmt: skip
-
 
 def measure_first(
     robot: FlexibleRobot,

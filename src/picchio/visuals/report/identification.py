@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from picchio.diagnosis.identified import Compared, Identification, Identified
+from picchio.diagnosis.identified import Compared, Identification
 from picchio.visuals.plots.style import BLUE, INK, MUTED, VERMILION, blank_figure, plain, styled
 from picchio.visuals.report.page import Pictures, capitalised, number, percent, render
 from picchio.visuals.scene.portrait import plot_mode
@@ -57,10 +57,7 @@ def identification_page(
         headline=capitalised(found._headline()) + ".",
         robot=found.robot.name,
         source=found.source,
-        joints=[
-            [joint.name, *_cells(joint.stiffness), *_cells(joint.damping_ratio)]
-            for joint in found.joints
-        ],
+        joints=found._listing(),
         reasons=[
             (joint.name, joint.stiffness.why, joint.damping_ratio.why) for joint in found.joints
         ],
@@ -85,11 +82,6 @@ def identification_page(
         warnings=[*warnings, *([found.doubt] if found.doubt else [])],
         provenance=content.get("provenance"),
     )
-
-
-def _cells(one: Identified) -> list[str]:
-    between = f"{number(one.low, 3)} to {number(one.high, 3)}"
-    return [number(one.value), between, "yes" if one.told else "no"]
 
 
 @styled

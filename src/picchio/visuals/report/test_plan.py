@@ -64,9 +64,7 @@ def plan_page(
         minutes=number(found.seconds / 60.0, 2),
         tracked=tracked,
         kinds={one.candidate.kind for one in found.records},
-        joints=[
-            [joint.name, number(joint.before, 3), number(joint.after, 3)] for joint in found.joints
-        ],
+        factors_of=found._factors(),
         factors=(spoken.factor(now), spoken.factor(then)),
         next_command=found.next_command("FOLDER"),
         command=command,
