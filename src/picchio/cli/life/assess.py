@@ -8,32 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from picchio.cli import options as typed
+from picchio.cli import output
 from picchio.cli.app import app
 from picchio.cli.life.how_sure import parse_spreads, show_spread
-from picchio.cli.options import (
-    BlowsGiven,
-    ClassOption,
-    GravityStiffnessOption,
-    JsonOption,
-    PayloadOption,
-    ReachOption,
-    ReportOption,
-    RobotGiven,
-    SNCurveOption,
-    TaskOption,
-)
-from picchio.cli.output import (
-    console,
-    count_of,
-    deliver,
-    details,
-    listed,
-    notice_first,
-    progress,
-    styled,
-    telling,
-    write_report,
-)
 from picchio.core import spoken
 from picchio.core.errors import InputError
 from picchio.core.listing import Key, Listing
@@ -48,16 +26,16 @@ if TYPE_CHECKING:
 
 @app.command()
 def assess(
-    given: RobotGiven,
+    given: typed.RobotGiven,
     *,
-    task: TaskOption = None,
-    payload: PayloadOption = None,
-    reach: ReachOption = None,
-    drive_class: ClassOption = None,
-    blows: BlowsGiven,
+    task: typed.TaskOption = None,
+    payload: typed.PayloadOption = None,
+    reach: typed.ReachOption = None,
+    drive_class: typed.ClassOption = None,
+    blows: typed.BlowsGiven,
     hits: Annotated[int | None, typer.Option(min=1)] = None,
     method: str = "rainflow",
-    sn_curve: SNCurveOption = None,
+    sn_curve: typed.SNCurveOption = None,
     residue: str = "half-cycles",
     mean_stress: str = "none",
     paper_mean_stress: bool = False,
@@ -67,15 +45,15 @@ def assess(
     spread: list[str] | None = None,
     seed: Annotated[int | None, typer.Option(min=0)] = None,
     compare_methods: bool = False,
-    gravity_stiffness: GravityStiffnessOption = None,
+    gravity_stiffness: typed.GravityStiffnessOption = None,
     gravity_balanced: bool = False,
     strict: bool = False,
-    report: ReportOption = None,
+    report: typed.ReportOption = None,
     title: str | None = None,
     customer: str | None = None,
     author: str | None = None,
     logo: Path | None = None,
-    json: JsonOption = None,
+    json: typed.JsonOption = None,
 ) -> None:
     """How many rivets each joint of a robot survives on a task.
 
@@ -138,7 +116,7 @@ def assess(
         from picchio.visuals.report.cover import embedded
 
         embedded(logo)  # refused before any work
-    with notice_first(json):
+    with output.notice_first(json):
         loaded = given.load(payload=payload, reach=reach, drive_class=drive_class)
     work = task_of(loaded, task, hits=hits, **vars(blows))
     options: dict[str, Any] = {
@@ -153,11 +131,11 @@ def assess(
         from picchio.studies.uncertainty.inputs import default_inputs
 
         inputs = default_inputs(work) | asked
-        with progress("samples") as tick:
+        with output.progress("samples") as tick:
             unsure = picchio.uncertain_life(
                 loaded, work, inputs=inputs, seed=seed or 0, progress=tick, **options
             )
-    with progress("poses") as tick:
+    with output.progress("poses") as tick:
         found = picchio.assess(
             loaded,
             work,
@@ -170,13 +148,13 @@ def assess(
     content = found.to_dict(arrays=True)
     terms: tuple[Term, ...] = ()
     if compare_methods or report is not None:
-        with telling("comparing the methods"):
+        with output.telling("comparing the methods"):
             terms = method_terms(loaded, work, found)
     if terms:
         content["method_terms"] = plain(terms)
     allowed = None
     if for_life is not None:
-        with telling("what this life allows"):
+        with output.telling("what this life allows"):
             allowed = picchio.allowable(
                 loaded, work, for_life, survival=survival, reducers=given.reducers or (), **options
             )
@@ -189,7 +167,7 @@ def assess(
     unsure = unsure or found.uncertainty
     if unsure is not None:
         content["uncertainty"] = unsure.to_dict()
-    write_report(
+    output.write_report(
         found,
         report,
         cover=cover,
@@ -204,14 +182,14 @@ def assess(
 
     def show_all() -> None:
         if allowed is not None:
-            console().print(f"{allowed.answer}\n", style="bold")
+            output.console().print(f"{allowed.answer}\n", style="bold")
         show(found, work, terms)
         if allowed is not None:
             _show_allowable(allowed, work, found)
         if unsure is not None:
             show_spread(unsure)
 
-    deliver(content, json, show_all)
+    output.deliver(content, json, show_all)
     promised = found.verdict.promised if allowed is None else allowed.yes
     if strict and not promised:
         raise typer.Exit(_NOT_SAFE)
@@ -224,17 +202,17 @@ def show(found: Assessment, task: Task, terms: tuple[Term, ...] = ()) -> None:
     """Print an assessment: verdict, joints, then what explains them."""
     from picchio.studies.assessment.method_comparison import terms_listing
 
-    out = console()
+    out = output.console()
     told, allowed = found.verdict, found.allowable
     on = f" on {task.files[0].name}" if task.files else ""
-    out.print(styled(f"{found.robot}{on}: {told.headline}"))
+    out.print(output.styled(f"{found.robot}{on}: {told.headline}"))
     if allowed is not None and allowed.told:
         out.print(allowed.told, style="bold")
     every = list(dict.fromkeys(_blows(operation) for operation in found.operations))
     whose = "" if not task.assumed else ", of its example task" if task.files else ", assumed"
     for blows in every:
-        out.print(f"  {blows}{whose}; {count_of(task.rivets_per_pass, 'rivet')} a pass")
-    out.print(styled("tool", f": {found.tool}"))
+        out.print(f"  {blows}{whose}; {output.count_of(task.rivets_per_pass, 'rivet')} a pass")
+    out.print(output.styled("tool", f": {found.tool}"))
     for line in filter(None, (found.notice, task.note)):
         out.print(f"{line}.", style="yellow")
     out.print()
@@ -245,19 +223,19 @@ def show(found: Assessment, task: Task, terms: tuple[Term, ...] = ()) -> None:
         order = ["joint", "utilisation", "reducer", "rivets to failure", "peak stress",
                  "gravity stress", "peak deflection", "peak torque", "gravity torque",
                  "damage a rivet", "worst at"]  # fmt: skip
-    out.print(listed(joints.only(*order)))
+    out.print(output.listed(joints.only(*order)))
     for line in told.reasons:
         if line not in (found.notice, task.note):
             out.print(f"  - {line}")
-    details()
+    output.details()
     if any(joint.reducer for joint in found.joints):
-        out.print(listed(found._reducers()))
+        out.print(output.listed(found._reducers()))
     out.print("The task", style="dim")
     for operation in found.operations:
         x, y, z = operation.direction
         which = f", {_blows(operation)}" if len(every) > 1 else ""
         out.print(
-            f"  {operation.name}: {count_of(len(operation.poses), 'pose')}, force along "
+            f"  {operation.name}: {output.count_of(len(operation.poses), 'pose')}, force along "
             f"({x:.3g}, {y:.3g}, {z:.3g}){which}"
         )
     if task.note:
@@ -265,12 +243,12 @@ def show(found: Assessment, task: Task, terms: tuple[Term, ...] = ()) -> None:
             out.print(f"  pose {k + 1}, rad (m): {', '.join(f'{q:.3g}' for q in pose)}")
     out.print()
     if len(found.operations) > 1 and any(joint.damage_share for joint in found.joints):
-        out.print(listed(_shares(found)))
+        out.print(output.listed(_shares(found)))
     # Of an estimated stiffness both are single cases.
     if found.steady_state and not found.notice:
-        out.print(listed(found._steady()))
+        out.print(output.listed(found._steady()))
     if terms:
-        out.print(listed(terms_listing(terms)))
+        out.print(output.listed(terms_listing(terms)))
     out.print("How this was computed", style="dim")
     for line in found.assumptions:
         if line not in told.reasons:
@@ -291,9 +269,9 @@ def _show_allowable(found: AllowableLoads, task: Task, life: Assessment) -> None
     """Print what a target life allows."""
     from picchio.studies.assessment.backwards import listing_of
 
-    out = console()
+    out = output.console()
     loads = {joint.name: joint.units.load for joint in life.joints}
-    out.print(listed(listing_of(found.joints, loads, found.held)))
+    out.print(output.listed(listing_of(found.joints, loads, found.held)))
     for key, ends in found.intervals.items():
         if not isinstance(ends, dict):
             out.print(f"In 80 % of the drawn cases the most {_MOST[key]}: {spoken.allowed(ends)}.")
@@ -312,4 +290,4 @@ _MOST = {"force": "force of the blows, N", "hits": "hits a rivet", "rivets": "ri
 
 
 def _blows(operation: OperationResult) -> str:
-    return f"{count_of(operation.hits_per_rivet, 'hit')} a rivet: {operation.excitation}"
+    return f"{output.count_of(operation.hits_per_rivet, 'hit')} a rivet: {operation.excitation}"

@@ -4,18 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from picchio.cli import output
 from picchio.cli.app import app
 from picchio.cli.options import FlexOption, JsonOption, ReportOption, TaskOption, ToolOption
-from picchio.cli.output import (
-    console,
-    deliver,
-    details,
-    listed,
-    progress,
-    styled,
-    table,
-    write_report,
-)
 from picchio.core import spoken
 
 if TYPE_CHECKING:
@@ -46,14 +37,14 @@ def compare(
     """
     import picchio
 
-    with progress("compared") as tick:
+    with output.progress("compared") as tick:
         found = picchio.compare(*items, task=task, robot=robot, flex=flex, tool=tool, progress=tick)
-    write_report(found, report)
-    deliver(found.to_dict(), json, lambda: _show(found))
+    output.write_report(found, report)
+    output.deliver(found.to_dict(), json, lambda: _show(found))
 
 
 def _show(found: Comparison) -> None:
-    out = console()
+    out = output.console()
     if found.bottom_line:
         out.print(f"{found.bottom_line}.", style="bold")
     judged = [item for item in found.items if item.verdict]
@@ -62,19 +53,19 @@ def _show(found: Comparison) -> None:
     if rows:
         out.print()
         heads = ("", "governed by", "joint", ">allowable\nover actual")
-        out.print(table(heads, rows))
+        out.print(output.table(heads, rows))
     _show_rows(found, found.figures, "What differs in the results")
-    details()
+    output.details()
     for item in judged:
-        out.print(styled(item.name, f": {item.verdict['headline']}"))
+        out.print(output.styled(item.name, f": {item.verdict['headline']}"))
     _show_rows(found, found.entered, "What differs in the inputs")
     for line in found.notes:
         out.print(f"  - {line}")
 
 
 def _show_rows(found: Comparison, rows: Sequence[Difference], title: str) -> None:
-    out = console()
+    out = output.console()
     if not rows:
         out.print(f"{title}: nothing.\n")
         return
-    out.print(listed(found._listing(rows, title)))
+    out.print(output.listed(found._listing(rows, title)))

@@ -4,15 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from picchio.cli import options as typed
 from picchio.cli.app import app
-from picchio.cli.options import (
-    BlowsGiven,
-    GravityStiffnessOption,
-    HitsOption,
-    JsonOption,
-    RobotGiven,
-    pose_given,
-)
 from picchio.cli.output import console, deliver, listed, styled
 from picchio.core import spoken
 
@@ -22,13 +15,13 @@ if TYPE_CHECKING:
 
 @app.command()
 def envelope(
-    given: RobotGiven,
+    given: typed.RobotGiven,
     *,
     pose: str | None = None,
-    blows: BlowsGiven,
-    hits: HitsOption = None,
-    gravity_stiffness: GravityStiffnessOption = None,
-    json: JsonOption = None,
+    blows: typed.BlowsGiven,
+    hits: typed.HitsOption = None,
+    gravity_stiffness: typed.GravityStiffnessOption = None,
+    json: typed.JsonOption = None,
 ) -> None:
     """The worst force direction of every joint at a pose.
 
@@ -42,7 +35,7 @@ def envelope(
     from picchio.robot.dynamics.pose import warn_beyond_limits
 
     loaded = given.load()
-    at = pose_given(pose) if pose else None
+    at = typed.pose_given(pose) if pose else None
     found = picchio.envelope(
         loaded, at, blows.on(loaded), hits=hits, gravity_stiffness=gravity_stiffness
     )

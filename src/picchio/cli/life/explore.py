@@ -8,26 +8,21 @@ from typing import Annotated
 
 import typer
 
+from picchio.cli import options as typed
 from picchio.cli.app import app
 from picchio.cli.ending import ending
-from picchio.cli.options import (
-    JsonOption,
-    RobotGiven,
-    TaskOption,
-    output,
-)
 from picchio.cli.output import deliver, telling
 
 
 @app.command()
 def explore(
-    given: RobotGiven,
+    given: typed.RobotGiven,
     *,
-    task: TaskOption = None,
+    task: typed.TaskOption = None,
     model: Path | None = None,
-    save: Annotated[Path | None, output("--save", added_to=True)] = None,
+    save: Annotated[Path | None, typed.output("--save", added_to=True)] = None,
     browser: Annotated[bool, typer.Option("--open")] = False,
-    json: JsonOption = None,
+    json: typed.JsonOption = None,
 ) -> None:
     """Live: drag the tool and see envelopes and life change.
 

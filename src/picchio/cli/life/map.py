@@ -7,27 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from picchio.cli import options as typed
+from picchio.cli import output
 from picchio.cli.app import app
-from picchio.cli.options import (
-    PAGES,
-    PICTURES,
-    BlowsGiven,
-    HitsOption,
-    JsonOption,
-    RobotGiven,
-    numbers,
-    out_beside,
-    output,
-)
-from picchio.cli.output import (
-    console,
-    deliver,
-    listed,
-    notice_first,
-    progress,
-    styled,
-    telling,
-)
 from picchio.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -39,9 +21,9 @@ if TYPE_CHECKING:
 
 @app.command("map")
 def map_(
-    given: RobotGiven,
+    given: typed.RobotGiven,
     *,
-    out: Annotated[Path | None, output("--out")] = None,
+    out: Annotated[Path | None, typed.output("--out")] = None,
     plane: str | None = None,
     at: float = 0.0,
     box: bool = False,
@@ -52,16 +34,16 @@ def map_(
     bounds: str | None = None,
     direction: str | None = None,
     branch: str = "all",
-    hits: HitsOption = None,
+    hits: typed.HitsOption = None,
     damage: bool = False,
-    blows: BlowsGiven,
+    blows: typed.BlowsGiven,
     chunk: Annotated[int | None, typer.Option(min=1)] = None,
     restart: bool = False,
     workers: Annotated[int | None, typer.Option(min=0)] = None,
     scheduler: str | None = None,
-    plot: Annotated[Path | None, output("--plot", *PICTURES)] = None,
-    html: Annotated[Path | None, output("--html", *PAGES)] = None,
-    json: JsonOption = None,
+    plot: Annotated[Path | None, typed.output("--plot", *typed.PICTURES)] = None,
+    html: Annotated[Path | None, typed.output("--html", *typed.PAGES)] = None,
+    json: typed.JsonOption = None,
 ) -> None:
     """Peaks, worst directions and frequencies over the workspace.
 
@@ -93,15 +75,17 @@ def map_(
     import picchio
     from picchio.studies.tasks import hits_of_rivet
 
-    with notice_first(json):
+    with output.notice_first(json):
         loaded = given.load()
-    out = out or out_beside(loaded.name, "-map.nc")
+    out = out or typed.out_beside(loaded.name, "-map.nc")
     where = _places(loaded, plane, at, box, points, surface, joint_grid, spacing, bounds)
     if direction is None:
         direction = "worst" if surface is None else "normal"
-    along = direction if direction in ("worst", "normal") else numbers(direction, "--direction")
+    along = (
+        direction if direction in ("worst", "normal") else typed.numbers(direction, "--direction")
+    )
     train = blows.on(loaded)
-    with progress("places") as report:
+    with output.progress("places") as report:
         found = picchio.workspace_map(
             loaded,
             where,
@@ -120,7 +104,7 @@ def map_(
     with found:
         summary = found.to_dict()
         _draw(found, loaded, train, hits, plot, html)
-    deliver(summary, json, lambda: _show(summary))
+    output.deliver(summary, json, lambda: _show(summary))
 
 
 def _draw(
@@ -136,7 +120,7 @@ def _draw(
         from picchio.core.files import atomic_write
         from picchio.visuals.plots.workspace import workspace_figure
 
-        with telling("drawing the map"), atomic_write(plot, "wb") as stream:
+        with output.telling("drawing the map"), atomic_write(plot, "wb") as stream:
             workspace_figure(found).savefig(stream, format=plot.suffix[1:], dpi=150)
     if html is not None:
         import numpy as np
@@ -146,7 +130,7 @@ def _draw(
         peak = found.dataset["peak_deflection"].values
         row = int(np.nanargmax(np.nanmax(np.where(np.isfinite(peak), peak, -1.0), axis=1)))
         pose = found.dataset["pose"].values[row]
-        with telling("drawing the page"):
+        with output.telling("drawing the page"):
             scene = picchio.view(robot, pose=pose, excitation=blows, hits=hits, workspace=found)
             scene.playing = False
             scene.save(html)
@@ -173,12 +157,12 @@ def _places(
     if points is not None:
         return places.points_from_csv(points)
     if grid is not None:
-        counts = numbers(grid, "--joint-grid")
+        counts = typed.numbers(grid, "--joint-grid")
         if not all(n.is_integer() for n in counts):
             raise InputError("must be whole numbers", key="--joint-grid", value=grid)
         whole = [round(n) for n in counts]
         return places.joint_grid(robot, whole[0] if len(whole) == 1 else whole)
-    limits = None if bounds is None else numbers(bounds, "--bounds")
+    limits = None if bounds is None else typed.numbers(bounds, "--bounds")
     if surface is None and not box:
         return places.plane(robot, plane or "xz", at=at, spacing=spacing, bounds=limits)
     if spacing is None:
@@ -191,10 +175,10 @@ def _places(
 def _show(summary: dict[str, Any]) -> None:
     from picchio.studies.maps.result import listing_of
 
-    out = console()
+    out = output.console()
     for note in summary["notes"]:
         out.print(f"{note}.", style="bold yellow")
-    out.print(styled(summary["robot"], f": {summary['poses']} poses in {summary['file']}"))
+    out.print(output.styled(summary["robot"], f": {summary['poses']} poses in {summary['file']}"))
     counted = summary["hits_of_damage"]
     along = {"worst": "each joint's worst direction", "normal": "along the surface's normal"}
     out.print(
@@ -202,7 +186,7 @@ def _show(summary: dict[str, Any]) -> None:
         f"{along.get(summary['direction'], 'along ' + summary['direction'])}"
     )
     title = "P10 to P90, where P90 is largest" if "estimate" in summary["joints"][0] else ""
-    out.print(listed(listing_of(summary), title))
+    out.print(output.listed(listing_of(summary), title))
     if counted:
         none = all(joint.get("damage_per_rivet", 0.0) == 0.0 for joint in summary["joints"])
         out.print(

@@ -8,23 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from picchio.cli import options as typed
+from picchio.cli import output
 from picchio.cli.app import app
-from picchio.cli.options import (
-    JsonOption,
-    RobotGiven,
-    SNCurveOption,
-    TaskOption,
-    numbers,
-    output,
-)
-from picchio.cli.output import (
-    console,
-    deliver,
-    listed,
-    notice_first,
-    progress,
-    styled,
-)
 from picchio.core import spoken
 from picchio.robot.annotations.flexibility import estimate_notice
 
@@ -34,19 +20,19 @@ if TYPE_CHECKING:
 
 @app.command()
 def place(
-    given: RobotGiven,
+    given: typed.RobotGiven,
     *,
-    task: TaskOption = None,
+    task: typed.TaskOption = None,
     move: str | None = None,
     period_range: str | None = None,
     margin: float = 0.0,
     off: float = 0.05,
     placements: int = 400,
-    sn_curve: SNCurveOption = None,
+    sn_curve: typed.SNCurveOption = None,
     self_collision: Annotated[bool, typer.Option("--self-collision/--no-self-collision")] = True,
     seed: Annotated[int, typer.Option(min=0)] = 0,
-    out: Annotated[Path | None, output("--out")] = None,
-    json: JsonOption = None,
+    out: Annotated[Path | None, typed.output("--out")] = None,
+    json: typed.JsonOption = None,
 ) -> None:
     """Where to put the work so that the robot lasts longest.
 
@@ -69,14 +55,14 @@ def place(
     from picchio.studies.placement.file import write_task
     from picchio.studies.placement.work import Work
 
-    far = None if move is None else numbers(move, "--move", 4)
+    far = None if move is None else typed.numbers(move, "--move", 4)
     if far is not None:
         far[3] = math.radians(far[3])
-    rates = None if period_range is None else numbers(period_range, "--period-range", 2)
-    with notice_first(json):
+    rates = None if period_range is None else typed.numbers(period_range, "--period-range", 2)
+    with output.notice_first(json):
         loaded = given.load()
     work = task_of(loaded, task)
-    with progress("steps of the search") as tick:
+    with output.progress("steps of the search") as tick:
         found = picchio.place(
             loaded,
             work,
@@ -95,18 +81,18 @@ def place(
 
     def show_all() -> None:
         for line in filter(None, (estimate_notice(loaded.name, loaded.origins), work.note)):
-            console().print(f"{line}.\n", style="bold yellow")
+            output.console().print(f"{line}.\n", style="bold yellow")
         _show(found, off)
 
-    deliver(found.to_dict(), json, show_all)
+    output.deliver(found.to_dict(), json, show_all)
 
 
 def _show(found: Placement, off: float) -> None:
-    out = console()
+    out = output.console()
     # Zeros are added for the sake of their sign.
     x, y, z = found.best.spot.move[:3].round(3) + 0.0
     heading = round(math.degrees(found.best.spot.move[3]), 2) + 0.0
-    out.print(styled(f"{found.robot}: {_gain(found)}"))
+    out.print(output.styled(f"{found.robot}: {_gain(found)}"))
     if found.moved:
         out.print(
             f"  work: shift by ({x:.3f}, {y:.3f}, {z:.3f}) m, turn by {heading:.2f} deg "
@@ -120,7 +106,7 @@ def _show(found: Placement, off: float) -> None:
     else:
         out.print("  nothing better than where the work is now was found")
     title = "At the stated values, which are uncertain" if found.sure else ""
-    out.print(listed(found._listing(), title))
+    out.print(output.listed(found._listing(), title))
     if found.moved and found.explained():
         out.print(found.explained())
     if found.sure:

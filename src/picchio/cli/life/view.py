@@ -7,20 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from picchio.cli import options as typed
 from picchio.cli.app import app
 from picchio.cli.ending import ending
-from picchio.cli.options import (
-    PAGES,
-    BlowsGiven,
-    GravityStiffnessOption,
-    JsonOption,
-    RobotGiven,
-    TaskOption,
-    joint_names,
-    out_beside,
-    output,
-    pose_given,
-)
 from picchio.cli.output import deliver, progress, telling
 from picchio.core.errors import InputError
 
@@ -30,20 +19,20 @@ if TYPE_CHECKING:
 
 @app.command()
 def view(
-    given: RobotGiven,
+    given: typed.RobotGiven,
     *,
-    out: Annotated[Path | None, output("--out", *PAGES)] = None,
-    rerun: Annotated[Path | None, output("--rerun", ".rrd")] = None,
+    out: Annotated[Path | None, typed.output("--out", *typed.PAGES)] = None,
+    rerun: Annotated[Path | None, typed.output("--rerun", ".rrd")] = None,
     live: bool = False,
-    task: TaskOption = None,
+    task: typed.TaskOption = None,
     pose: str | None = None,
     hits: int | None = None,
-    blows: BlowsGiven,
+    blows: typed.BlowsGiven,
     map_: Annotated[Path | None, typer.Option("--map")] = None,
     diagnosis: Path | None = None,
-    joint: Annotated[str | None, typer.Option(autocompletion=joint_names)] = None,
-    gravity_stiffness: GravityStiffnessOption = None,
-    json: JsonOption = None,
+    joint: Annotated[str | None, typer.Option(autocompletion=typed.joint_names)] = None,
+    gravity_stiffness: typed.GravityStiffnessOption = None,
+    json: typed.JsonOption = None,
 ) -> None:
     """The robot in 3-D as HTML: envelopes, rivets and vibration.
 
@@ -64,7 +53,7 @@ def view(
 
     loaded = given.load()
     if out is None and rerun is None and not live:
-        out = out_beside(loaded.name, "-scene.html")
+        out = typed.out_beside(loaded.name, "-scene.html")
     if pose is None:
         for key, value in vars(blows).items():
             if value is not None:
@@ -74,7 +63,7 @@ def view(
         scene = picchio.view(
             loaded,
             task=task,
-            pose=None if pose is None else pose_given(pose),
+            pose=None if pose is None else typed.pose_given(pose),
             excitation=None if pose is None else blows.on(loaded, task),
             hits=hits,
             workspace=map_,

@@ -8,27 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from picchio.cli import options as typed
+from picchio.cli import output
 from picchio.cli.app import app
-from picchio.cli.options import (
-    FlexOption,
-    GravityStiffnessOption,
-    JsonOption,
-    ReducersOption,
-    ReportOption,
-    ToolOption,
-)
-from picchio.cli.output import (
-    console,
-    count_of,
-    deliver,
-    details,
-    progress,
-    say_warning,
-    styled,
-    table,
-    whole,
-    write_report,
-)
 from picchio.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -44,13 +26,13 @@ def check(
     *,
     robot: str | None = None,
     no_robot: bool = False,
-    flex: FlexOption = None,
-    tool: ToolOption = None,
-    reducers: ReducersOption = None,
+    flex: typed.FlexOption = None,
+    tool: typed.ToolOption = None,
+    reducers: typed.ReducersOption = None,
     keep_going: bool = False,
-    gravity_stiffness: GravityStiffnessOption = None,
-    report: ReportOption = None,
-    json: JsonOption = None,
+    gravity_stiffness: typed.GravityStiffnessOption = None,
+    report: typed.ReportOption = None,
+    json: typed.JsonOption = None,
 ) -> None:
     """What is in measured data, and what is wrong with them.
 
@@ -75,39 +57,39 @@ def check(
     loaded = picchio.load_campaign(campaign, clock_tolerance=math.inf)
     if report is not None and (no_robot or (robot or loaded.robot) is None):
         raise InputError("needs a robot", key="--report", hint="name one with --robot")
-    with progress("records") as tell:
+    with output.progress("records") as tell:
         found = picchio.check(
             loaded, robot, flex=flex, tool=tool, reducers=reducers or (), use_robot=not no_robot,
             keep_going=keep_going, progress=tell,
         )  # fmt: skip
-    write_report(found, report, gravity_stiffness=gravity_stiffness)
-    deliver(found.to_dict(), json, lambda: _show(found))
+    output.write_report(found, report, gravity_stiffness=gravity_stiffness)
+    output.deliver(found.to_dict(), json, lambda: _show(found))
     if json == "-":  # what people would have read in the table
         for group in found.groups():
             if group[0].severity != "note":
                 more = f" (and {len(group) - 1} more like it)" if len(group) > 1 else ""
-                say_warning(f"{group[0]}{more}")
+                output.say_warning(f"{group[0]}{more}")
     errors = [finding for finding in found.findings if finding.severity == "error"]
     if errors:
         raise InputError(
-            f"{count_of(len(errors), 'error')} found, first: {errors[0]}", file=campaign
+            f"{output.count_of(len(errors), 'error')} found, first: {errors[0]}", file=campaign
         )
 
 
 def _show(report: QualityReport) -> None:
-    out = console()
+    out = output.console()
     counts = {word: report.count(word) for word in _STYLES}
-    wrong = ", ".join(count_of(n, word) for word, n in counts.items() if n)
+    wrong = ", ".join(output.count_of(n, word) for word, n in counts.items() if n)
     if not (counts["error"] or counts["warning"]):
         wrong = (f"nothing wrong was found ({counts['note']} notes): {len(report.checks)} kinds of "
                  "faults were looked for")  # fmt: skip
     name = str(report.campaign.folder or "campaign in memory")
-    out.print(styled(f"{name}: {wrong}."))
+    out.print(output.styled(f"{name}: {wrong}."))
     _show_contents(report)
     if report.findings:
         out.print(_finding_table(report))
     out.print(_channel_table(report))
-    details()
+    output.details()
     out.print(_record_table(report.records))
     if report.repeats:
         worst = max(report.repeats, key=lambda c: c.difference)
@@ -120,10 +102,10 @@ def _show(report: QualityReport) -> None:
 
 
 def _show_contents(report: QualityReport) -> None:
-    out = console()
+    out = output.console()
     campaign, records = report.campaign, report.records
     robot = report.robot.name if report.robot else "no robot: limits and axes are not checked"
-    out.print(f"{count_of(len(records), 'record')}; {robot}")
+    out.print(f"{output.count_of(len(records), 'record')}; {robot}")
     hits = [r for r in records if r.kind == "percussion"]
     motions = [r for r in records if r.kind == "motion"]
     if hits:
@@ -133,17 +115,19 @@ def _show_contents(report: QualityReport) -> None:
         level = "the force recorded"
         if levels:
             level = f"{levels[0]:g}" + (f" to {levels[-1]:g}" if len(levels) > 1 else "")
-            level = f"{count_of(len(levels), 'level')} ({level} N)"
+            level = f"{output.count_of(len(levels), 'level')} ({level} N)"
         steady = sum(record.steady for record in campaign)
-        bursts = f"{count_of(len(hits) - steady, 'burst')}, {steady} steady"
-        out.print(
-            f"  percussion: {count_of(len(hits), 'record')} ({bursts}), "
-            f"{count_of(len(poses), 'pose')}, {count_of(len(directions), 'direction')}, "
-            f"{level}"
+        bursts = f"{output.count_of(len(hits) - steady, 'burst')}, {steady} steady"
+        told = (
+            output.count_of(len(hits), "record") + f" ({bursts})",
+            output.count_of(len(poses), "pose"),
+            output.count_of(len(directions), "direction"),
+            level,
         )
+        out.print(f"  percussion: {', '.join(told)}")
     if motions:
         seconds = sum(r.end - r.start for r in motions)
-        out.print(f"  motion: {count_of(len(motions), 'record')}, {seconds:.4g} s")
+        out.print(f"  motion: {output.count_of(len(motions), 'record')}, {seconds:.4g} s")
     rates = sorted({round(r.rate, 2) for r in records})
     if rates:
         out.print(f"  sampled at {', '.join(f'{rate:g}' for rate in rates[:6])} Hz")
@@ -170,7 +154,7 @@ def _record_table(records: Sequence[RecordSummary]) -> FittedTable:
         ))  # fmt: skip
     heads = ("record", "what was done", "pose\nrad, m", "force along", ">from\ns", ">to\ns",
              ">samples", ">rate\nHz", ">channels")  # fmt: skip
-    return table(heads, rows)
+    return output.table(heads, rows)
 
 
 def _done(record: RecordSummary) -> str:
@@ -203,12 +187,12 @@ def _channel_table(report: QualityReport) -> FittedTable:
                      f"{max(rms):.3g}", *cells))  # fmt: skip
     heads = ("channel", "unit", ">in records", ">RMS,\nleast", ">RMS,\nmost", ">noise\n(std)",
              ">known\nto", ">signal over\nnoise, dB", ">hum", "colour")  # fmt: skip
-    return table(heads, rows, title="Channels and their noise")
+    return output.table(heads, rows, title="Channels and their noise")
 
 
 def _finding_table(report: QualityReport) -> FittedTable:
     rows = []
-    for group in [[finding] for finding in report.findings] if whole() else report.groups():
+    for group in [[finding] for finding in report.findings] if output.whole() else report.groups():
         worst = group[0]
         channels = sorted({f.channel for f in group if f.channel})
         files = sorted({f.record for f in group if f.record})
@@ -216,6 +200,6 @@ def _finding_table(report: QualityReport) -> FittedTable:
         if files:
             count = f"{len(files)} of {len(report.records)} records, worst {worst.record}"
             where += (": " if where else "") + (files[0] if len(files) == 1 else count)
-        mark = styled(worst.severity, style=_STYLES[worst.severity])
+        mark = output.styled(worst.severity, style=_STYLES[worst.severity])
         rows.append((mark, where or "campaign", worst.message, worst.advice))
-    return table(("", "where", "what was seen", "what to do"), rows, title="What was found")
+    return output.table(("", "where", "what was seen", "what to do"), rows, title="What was found")

@@ -9,27 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import typer
 
+from picchio.cli import options as typed
+from picchio.cli import output
 from picchio.cli.app import app
-from picchio.cli.options import (
-    JsonOption,
-    ReportOption,
-    RobotGiven,
-    SNCurveOption,
-    TaskOption,
-)
-from picchio.cli.output import (
-    console,
-    count_of,
-    deliver,
-    details,
-    listed,
-    notice_first,
-    progress,
-    say_warning,
-    styled,
-    to_write,
-    write_report,
-)
 from picchio.core import spoken
 from picchio.core.errors import InputError
 from picchio.robot.annotations.flexibility import estimate_notice
@@ -41,19 +23,19 @@ if TYPE_CHECKING:
 
 @app.command()
 def count(
-    given: RobotGiven,
+    given: typed.RobotGiven,
     *,
     ledger: Path,
     log: list[Path] | None = None,
     mapping: Path | None = None,
-    task: TaskOption = None,
-    sn_curve: SNCurveOption = None,
+    task: typed.TaskOption = None,
+    sn_curve: typed.SNCurveOption = None,
     watch: bool = False,
     every: Annotated[float, typer.Option(min=0.1)] = 10.0,
     hours_per_day: float | None = None,
     seed: Annotated[int, typer.Option(min=0)] = 0,
-    report: ReportOption = None,
-    json: JsonOption = None,
+    report: typed.ReportOption = None,
+    json: typed.JsonOption = None,
 ) -> None:
     """What the blows in a robot's logs did to it, and the life left.
 
@@ -75,32 +57,32 @@ def count(
 
     if watch and not log:
         raise InputError("needs a folder to watch", key="--log")
-    with notice_first(json):
+    with output.notice_first(json):
         loaded = given.load()
-    to_write(ledger, "--ledger", added_to=True)
+    output.to_write(ledger, "--ledger", added_to=True)
     before: list[tuple[str, int, int]] | None = None
     while True:
         now = _listing(log or [])
         if now != before:
             before = now
             try:
-                with progress("logs") as tick:
+                with output.progress("logs") as tick:
                     found = picchio.count(loaded, log or None, ledger, mapping=mapping, task=task,
                                           sn_curve=sn_curve, seed=seed,
                                           hours_per_day=hours_per_day, progress=tick)  # fmt: skip
             except InputError as error:
                 if not watch or not _in_any(error.file, log or []):
                     raise
-                say_warning(f"nothing is counted yet: {error}")  # it may be written just now
+                output.say_warning(f"nothing is counted yet: {error}")  # it may be written just now
             else:
-                write_report(found, report)
+                output.write_report(found, report)
 
                 def show(found: Count = found) -> None:
                     if notice := estimate_notice(loaded.name, loaded.origins):
-                        console().print(f"{notice}.\n", style="bold yellow")
+                        output.console().print(f"{notice}.\n", style="bold yellow")
                     _show(found, task_of(loaded, task))
 
-                deliver(found.to_dict(arrays=True), json, show)
+                output.deliver(found.to_dict(arrays=True), json, show)
         if not watch:
             return
         time.sleep(every)
@@ -122,13 +104,13 @@ def _listing(logs: list[Path]) -> list[tuple[str, int, int]]:
 
 
 def _show(found: Count, task: Task) -> None:
-    out = console()
+    out = output.console()
     forces = {operation.excitation.peak_force for operation in task.operations}
     force = spoken.between((min(forces), max(forces)))
     out.print(
-        styled(
+        output.styled(
             found.model.robot.name,
-            f": {found.blows} blows in {count_of(found.logs, 'log')} of {found.logged}; "
+            f": {found.blows} blows in {output.count_of(found.logs, 'log')} of {found.logged}; "
             + (
                 "all of them seen"
                 if found.seen_share == 1.0
@@ -153,13 +135,13 @@ def _show(found: Count, task: Task) -> None:
         wide = f"{1e3 * width:.3g} ms wide ({samples:.3g} samples)"
         out.print(f"Blows as seen: {spoken.number(peak)} N, {wide}{rate}, in the mean.")
     for change in found.changes:
-        out.print(styled("changed: ", change["words"], style="bold yellow"))
-    out.print(listed(found._listing()))
+        out.print(output.styled("changed: ", change["words"], style="bold yellow"))
+    out.print(output.listed(found._listing()))
     for name, why in found.refused:
-        out.print(styled(f"not counted: {name}", f": {why}", style="bold yellow"))
+        out.print(output.styled(f"not counted: {name}", f": {why}", style="bold yellow"))
     for note in found.notes:
         out.print(f"  - {note}")
-    details()
+    output.details()
     places = found.stations()
     if places and end is not None:
         places = sorted(places, key=lambda s: -float(s["share"][end]))[:3]
@@ -176,9 +158,9 @@ def _show(found: Count, task: Task) -> None:
         out.print(f"counted {first}: {'; '.join(found.detected[first])}")
         if others:
             ends = " to ".join(dict.fromkeys([others[0], others[-1]]))
-            out.print(f"counted {ends}: {count_of(len(others), 'log')} like it")
+            out.print(f"counted {ends}: {output.count_of(len(others), 'log')} like it")
     if found.known:
-        out.print(f"{count_of(len(found.known), 'log')} counted before")
+        out.print(f"{output.count_of(len(found.known), 'log')} counted before")
 
 
 def _angles(pose: np.ndarray) -> str:

@@ -7,24 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from picchio.cli import options as typed
+from picchio.cli import output
 from picchio.cli.app import app
-from picchio.cli.options import (
-    DataOption,
-    GravityStiffnessOption,
-    JsonOption,
-    ReportOption,
-    RobotGiven,
-    output,
-)
-from picchio.cli.output import (
-    console,
-    count_of,
-    deliver,
-    styled,
-    table,
-    telling,
-    write_report,
-)
 from picchio.core import spoken
 from picchio.core.files import write_text
 
@@ -36,18 +21,18 @@ if TYPE_CHECKING:
 
 @app.command()
 def diagnose(
-    given: RobotGiven,
+    given: typed.RobotGiven,
     *,
-    data: DataOption,
+    data: typed.DataOption,
     task: Path | None = None,
     without: list[str] | None = None,
     train: list[str] | None = None,
     held_out: list[str] | None = None,
-    model: Annotated[Path | None, output("--model", ".toml")] = None,
-    report: ReportOption = None,
-    plan: Annotated[Path | None, output("--plan")] = None,
-    gravity_stiffness: GravityStiffnessOption = None,
-    json: JsonOption = None,
+    model: Annotated[Path | None, typed.output("--model", ".toml")] = None,
+    report: typed.ReportOption = None,
+    plan: Annotated[Path | None, typed.output("--plan")] = None,
+    gravity_stiffness: typed.GravityStiffnessOption = None,
+    json: typed.JsonOption = None,
 ) -> None:
     """What a simulation gets wrong about measured data, and why.
 
@@ -71,7 +56,7 @@ def diagnose(
     campaign = picchio.load_campaign(data)
     moves = {record.kind for record in campaign} == {"motion"}
     given.load(allow_rigid=moves)
-    with telling("reading the data") as say:
+    with output.telling("reading the data") as say:
         found = picchio.diagnose(
             given.robot,
             campaign,
@@ -86,10 +71,10 @@ def diagnose(
         )
     if model is not None:
         write_text(model, found.model_text(model.parent))
-    write_report(found, report, folder=None if model is None else model.parent)
+    output.write_report(found, report, folder=None if model is None else model.parent)
     if plan is not None and found.plan is not None:
         write_text(plan, found.plan)
-    deliver(found.to_dict(), json, lambda: show_diagnosis(found, plan))
+    output.deliver(found.to_dict(), json, lambda: show_diagnosis(found, plan))
 
 
 # What is said of a cause that percussion and motion records could both show.
@@ -106,11 +91,11 @@ def show_diagnosis(found: Diagnosis, plan: Path | None = None) -> None:
     from picchio.diagnosis.result import differences, in_tolerances, in_words
     from picchio.model.effects.registry import effect_class
 
-    out = console()
-    out.print(styled(f"{found.answer}."))
+    out = output.console()
+    out.print(output.styled(f"{found.answer}."))
     gain = found.gain
     if gain is not None:
-        where = f"On {count_of(len(gain.held_out_records), 'record')} held out"
+        where = f"On {output.count_of(len(gain.held_out_records), 'record')} held out"
         if not gain.held_out_records:
             where = "Nothing was held out; on what was fitted"
         out.print(f"{where} {gain.told}.")
@@ -130,7 +115,7 @@ def show_diagnosis(found: Diagnosis, plan: Path | None = None) -> None:
             # The cause is named in its first row alone.
             rows += [heads + (values or [[]])[0], *(["", "", "", *row] for row in values[1:])]
         columns = ("cause", "where", "confidence", ">value", ">std", "unit")
-        out.print(table(columns, rows, ruled=False, head_style="dim"))
+        out.print(output.table(columns, rows, ruled=False, head_style="dim"))
         for name in dict.fromkeys(cause.effect for cause in found.causes):
             out.print(f"  {name}: {effect_class(name).meaning}")
         for cause in found.causes:
@@ -183,14 +168,14 @@ def _show_channels(told: Sequence[Mapping[str, Any]]) -> None:
             for row in told
         ]  # fmt: skip
         columns = ("left in (RMS, SI)", ">before", ">after", ">noise", "verdict")
-        console().print(table(columns, rows, ruled=False, head_style="dim"))
+        output.console().print(output.table(columns, rows, ruled=False, head_style="dim"))
 
 
 def _show_life(life: Mapping[str, Any]) -> None:
     def between(joint: Mapping[str, Any], key: str, show: Callable[[float], str]) -> Text | str:
         """The interval, where it says more than the value."""
         low, high = (show(end) for end in joint.get(key, (math.nan, math.nan)))
-        return "" if low == high else styled(f"{low} to {high}", style="dim")
+        return "" if low == high else output.styled(f"{low} to {high}", style="dim")
 
     rows = []
     for name, before in life["baseline"]["joints"].items():
@@ -202,8 +187,8 @@ def _show_life(life: Mapping[str, Any]) -> None:
         if any(spans):
             rows.append(["", *spans])
     columns = ("joint", ">rivets before", ">after", ">utilisation before %", ">after %")
-    out = console()
-    out.print(table(columns, rows, ruled=False, head_style="dim", title="Life"))
+    out = output.console()
+    out.print(output.table(columns, rows, ruled=False, head_style="dim", title="Life"))
     if "interval_level" in life:
         out.print(
             f"  {100 * life['interval_level']:g} % intervals. Before: all that has a tolerance "
@@ -220,18 +205,18 @@ def _show_what_to_mend(life: Mapping[str, Any]) -> None:
     for place, row in enumerate(life.get("causes") or ()):
         what = f"{row['effect']} of {row['target']}"
         if not matters(row, life):
-            console().print(f"  {what} does not change the life")
+            output.console().print(f"  {what} does not change the life")
             continue
         told = row.get("why") or (
             f"rivets {spoken.count(row['rivets_to_failure'])}, "
             f"utilisation {spoken.per_cent(row['utilisation'])} %"
         )
-        console().print(f"  {'mend first ' if place == 0 else ''}{what}; after that: {told}")
+        output.console().print(f"  {'mend first ' if place == 0 else ''}{what}; after that: {told}")
 
 
 def _show_other_lives(found: Diagnosis, lives: Sequence[Mapping[str, Any]]) -> None:
     """The lives with the sets of causes that the data cannot tell from those named."""
-    out = console()
+    out = output.console()
     for pairs, other in zip(found.alternatives, lives, strict=False):
         names = " and ".join(f"{effect} of {target}" for effect, target in pairs)
         instead = other.get("why") or (

@@ -5,22 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from picchio.cli import options as typed
+from picchio.cli import output
 from picchio.cli.app import app
-from picchio.cli.options import (
-    DataOption,
-    JsonOption,
-    ReportOption,
-    RobotGiven,
-    output,
-)
-from picchio.cli.output import (
-    console,
-    deliver,
-    listed,
-    say_warning,
-    telling,
-    write_report,
-)
 from picchio.core.files import write_text
 
 if TYPE_CHECKING:
@@ -29,12 +16,12 @@ if TYPE_CHECKING:
 
 @app.command()
 def identify(
-    given: RobotGiven,
+    given: typed.RobotGiven,
     *,
-    data: DataOption,
-    out: Annotated[Path, output("--out")],
-    report: ReportOption = None,
-    json: JsonOption = None,
+    data: typed.DataOption,
+    out: Annotated[Path, typed.output("--out")],
+    report: typed.ReportOption = None,
+    json: typed.JsonOption = None,
 ) -> None:
     """Stiffness and damping from measured data, as a sidecar.
 
@@ -50,20 +37,20 @@ def identify(
 
     campaign = picchio.load_campaign(data)
     loaded = given.load(allow_rigid=not needs_springs(campaign))
-    with telling("reading the data") as say:
+    with output.telling("reading the data") as say:
         found = picchio.identify(loaded, campaign, progress=say)
     write_text(out, found.sidecar_text())
     if found.doubt:
-        say_warning(found.doubt)
-    write_report(found, report)
-    deliver(found.to_dict(), json, lambda: show_identified(found))
+        output.say_warning(found.doubt)
+    output.write_report(found, report)
+    output.deliver(found.to_dict(), json, lambda: show_identified(found))
 
 
 def show_identified(found: Identification) -> None:
     """Print every joint's stiffness with its interval, why, and what else the answer says."""
-    out = console()
+    out = output.console()
     shown = found._listing().only("joint", "stiffness", "90 % interval", "determined by the data")
-    out.print(listed(shown, ""))
+    out.print(output.listed(shown, ""))
     for joint in found.joints:
         out.print(f"  {joint.name}: {joint.stiffness.why}")
     for line in found.remarks:

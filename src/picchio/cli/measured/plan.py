@@ -7,24 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from picchio.cli import options as typed
+from picchio.cli import output
 from picchio.cli.app import app
-from picchio.cli.options import (
-    JsonOption,
-    ReportOption,
-    RobotGiven,
-    TaskOption,
-    folder,
-)
-from picchio.cli.output import (
-    console,
-    deliver,
-    listed,
-    notice_first,
-    styled,
-    table,
-    telling,
-    write_report,
-)
 
 if TYPE_CHECKING:
     from picchio.diagnosis.planning.plan import PlannedTests
@@ -32,17 +17,17 @@ if TYPE_CHECKING:
 
 @app.command()
 def plan(
-    given: RobotGiven,
+    given: typed.RobotGiven,
     *,
-    task: TaskOption = None,
+    task: typed.TaskOption = None,
     budget: str = "20min",
     instruments: Annotated[str, typer.Option("--with")] = "scale,dial",
     force: float | None = None,
-    to: Annotated[Path | None, folder("--to")] = None,
+    to: Annotated[Path | None, typed.folder("--to")] = None,
     overwrite: bool = False,
     seed: Annotated[int, typer.Option(min=0)] = 0,
-    report: ReportOption = None,
-    json: JsonOption = None,
+    report: typed.ReportOption = None,
+    json: typed.JsonOption = None,
 ) -> None:
     """The tests for stiffness that narrow the life on a task most.
 
@@ -63,25 +48,25 @@ def plan(
     from picchio.studies.default_task import task_of
 
     hands = [name.strip() for name in instruments.split(",") if name.strip()]
-    with notice_first(json):
+    with output.notice_first(json):
         loaded = given.load()
     work = task_of(loaded, task)
-    with telling("planning") as say:
+    with output.telling("planning") as say:
         found = picchio.plan(
             loaded, work, budget=budget, instruments=hands, force=force, seed=seed, progress=say
         )
     if to is not None:
         found.save(to, overwrite=overwrite)
-        write_report(found, to / "sheet.html")
-    write_report(found, report)
-    deliver(found.to_dict(), json, lambda: _show(found, to))
+        output.write_report(found, to / "sheet.html")
+    output.write_report(found, report)
+    output.deliver(found.to_dict(), json, lambda: _show(found, to))
 
 
 def _show(found: PlannedTests, to: Path | None) -> None:
     from picchio.diagnosis.planning.kind import along, angles
 
-    out = console()
-    out.print(styled(f"{found._headline()}."))
+    out = output.console()
+    out.print(output.styled(f"{found._headline()}."))
     rows, before = [], None
     for k, record in enumerate(found.records, start=1):
         one = record.candidate
@@ -95,11 +80,11 @@ def _show(found: PlannedTests, to: Path | None) -> None:
         rows.append([str(k), told, f"{load} {along(one.direction)}", reads,
                      f"{record.seconds / 60.0:.1f}"])  # fmt: skip
     if rows:
-        out.print(table(("", "pose, deg or mm", "load", "read along", ">min"), rows))
+        out.print(output.table(("", "pose, deg or mm", "load", "read along", ">min"), rows))
     if to is not None:
         out.print("Fill in the form, then:")
-        out.print(styled(f"  {found.next_command(str(to))}"), soft_wrap=True)
+        out.print(output.styled(f"  {found.next_command(str(to))}"), soft_wrap=True)
     out.print(f"No more records: {found.choice.why}.")
-    out.print(listed(found._factors()))
+    out.print(output.listed(found._factors()))
     for note in found.notes:
         out.print(f"  - {note}")

@@ -7,13 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from picchio.cli import options as typed
 from picchio.cli.app import app
-from picchio.cli.options import (
-    GravityStiffnessOption,
-    JsonOption,
-    RobotGiven,
-    folder,
-)
 from picchio.cli.output import console, deliver, progress
 
 if TYPE_CHECKING:
@@ -22,15 +17,15 @@ if TYPE_CHECKING:
 
 @app.command()
 def simulate(
-    given: RobotGiven,
+    given: typed.RobotGiven,
     *,
     plan: Path,
-    to: Annotated[Path, folder("--to")],
-    gravity_stiffness: GravityStiffnessOption = None,
+    to: Annotated[Path, typed.folder("--to")],
+    gravity_stiffness: typed.GravityStiffnessOption = None,
     seed: Annotated[int | None, typer.Option(min=0)] = None,
     parquet: bool = False,
     overwrite: bool = False,
-    json: JsonOption = None,
+    json: typed.JsonOption = None,
 ) -> None:
     """The measured data that a test plan would give.
 

@@ -4,16 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from picchio.cli import output
 from picchio.cli.app import app
 from picchio.cli.options import JsonOption, ReportOption
-from picchio.cli.output import (
-    console,
-    deliver,
-    progress,
-    styled,
-    table,
-    write_report,
-)
 
 if TYPE_CHECKING:
     from picchio.paper.run import Reproduction
@@ -41,14 +34,14 @@ def reproduce(
     from picchio.paper.world import parse_assumptions
 
     given = parse_assumptions(assume or [])
-    with progress("hypotheses about Table 2") as told:
+    with output.progress("hypotheses about Table 2") as told:
         found = picchio.reproduce(given, worlds=WORLDS if worlds is None else worlds, progress=told)
-    write_report(found, report)
-    deliver(found.to_dict(), json, lambda: _show(found))
+    output.write_report(found, report)
+    output.deliver(found.to_dict(), json, lambda: _show(found))
 
 
 def _show(found: Reproduction) -> None:
-    screen = console()
+    screen = output.console()
     printed = found.study.printed
     screen.print(f"{found._headline()}.", style="bold")
     lives = found.study.curve_of_table
@@ -64,6 +57,6 @@ def _show(found: Reproduction) -> None:
     rows = []
     for tried in found.claims:
         mark = str(tried.verdict)
-        told = styled(mark, f" {tried.condition or ''}", style=colour[mark])
+        told = output.styled(mark, f" {tried.condition or ''}", style=colour[mark])
         rows.append((told, str(tried.page), tried.quote))
-    screen.print(table(("verdict", ">p.", "claim"), rows, ruled=False))
+    screen.print(output.table(("verdict", ">p.", "claim"), rows, ruled=False))
