@@ -299,18 +299,19 @@ def listing_of(
     units, first = loads or {}, joints[0]
     sure = "" if first.survival is None else f", survival {first.survival:g}"
     sure += "" if held is None else ", at the stated values"
+    unknown = lambda j: j.met is None and math.isinf(j.force_factor)  # noqa: E731
     unlimited = lambda j: spoken.UNLIMITED if j.hits is None else j.hits  # noqa: E731
     columns: dict[str, Key] = {
         "joint": "joint",
         "rivets as it is": lambda j: spoken.count(j.life),
-        "force times": lambda j: None if j.met is None else j.force_factor,
+        "force times": lambda j: None if unknown(j) else j.force_factor,
         "by its": lambda j: j.governed_by or None,
-        "hits a rivet": lambda j: None if j.met is None else unlimited(j),
+        "hits a rivet": lambda j: None if unknown(j) else unlimited(j),
         "shaft radius at least [mm]": lambda j: 1e3 * j.radius,
         "peak torque": lambda j: InUnit(j.peak_torque, units.get(j.joint, "N m")),
         "smallest reducer": "reducer",
     }
-    title = f"What a life of {spoken.count(first.rivets)} rivets{sure} allows"
+    title = f"What a life of {spoken.count(first.rivets)} rivets allows{sure}"
     return Listing.of(title, joints, columns)
 
 

@@ -476,8 +476,12 @@ class Assessment(TableResult):
             "joint": "name",
             "reducer": "reducer",
             "the limit that binds": lambda j: j.reducer_governed_by or None,
-            "torque [N m]": lambda j: j.reducer_governing and j.reducer_governing.torque,
-            "limit [N m]": lambda j: j.reducer_governing and j.reducer_governing.limit,
+            "torque [N m]": lambda j: (
+                j.reducer_governing and spoken.number(j.reducer_governing.torque, 4)
+            ),
+            "limit [N m]": lambda j: (
+                j.reducer_governing and spoken.number(j.reducer_governing.limit, 4)
+            ),
             "utilisation [%]": lambda j: j.told_percent("reducer_utilisation"),
         }
         return Listing.of("The reducers", worn, columns)
