@@ -60,7 +60,7 @@ class Column:
         for cell in self.cells:
             value, unit = cell if isinstance(cell, InUnit) else (cell, self.unit)
             text = value if isinstance(value, str) else tell(value)
-            texts.append(text if unit == self.unit or text == "-" else f"{text} {unit}")
+            texts.append(text if unit == self.unit or text in _NONE else f"{text} {unit}")
         return texts
 
     @property
