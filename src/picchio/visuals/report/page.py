@@ -146,7 +146,11 @@ def number(value: float | None, digits: int = spoken.DIGITS) -> str:
 
 
 def typeset(text: str) -> str:
-    """The same, where it is told already; words stay as they are."""
+    """The same, where it is told already; words stay as they are.
+
+    Args:
+        text: of a cell.
+    """
     if text == "-":
         return "\N{EN DASH}"
     if not _TOLD.fullmatch(text):
