@@ -136,19 +136,14 @@ def curve_of_table(printed: Printed) -> CurveOfTable:
     labels = tuple(f"{printed.table2[d].direction}, joint {j + 1}" for d, j in np.argwhere(finite))
     stress, cycles = printed.stress[finite], printed.cycles[finite]
     rounding = rounding_of(stress, cycles, printed.sn_curve.exponent)
+    entries = np.array([np.log(stress), np.log(cycles), rounding])
     fits = [
-        _fit(name, count, fit, np.log(stress), np.log(cycles), rounding, aside)
+        _fit(name, count, fit, entries, aside)
         for (name, fit), count in zip(hypotheses(printed).items(), _PARAMETERS, strict=True)
         for aside in (False, True)
     ]
-    return CurveOfTable(
-        stress,
-        cycles,
-        labels,
-        printed.sn_curve.cycles(stress) / cycles,
-        tuple(sorted(fits, key=lambda f: f.bic)),
-        rounding,
-    )
+    over, best_first = printed.sn_curve.cycles(stress) / cycles, sorted(fits, key=lambda f: f.bic)
+    return CurveOfTable(stress, cycles, labels, over, tuple(best_first), rounding)
 
 
 def rounding_of(stress: FloatArray, cycles: FloatArray, exponent: float) -> FloatArray:
@@ -157,43 +152,32 @@ def rounding_of(stress: FloatArray, cycles: FloatArray, exponent: float) -> Floa
     return np.asarray(0.5 * digit / cycles + exponent * 0.005 / stress)
 
 
-def _fit(
-    name: str,
-    count: int,
-    fit: Hypothesis,
-    s: FloatArray,
-    n: FloatArray,
-    rounding: FloatArray,
-    aside: bool,
-) -> CurveFit:
+def _fit(name: str, count: int, fit: Hypothesis, entries: FloatArray, aside: bool) -> CurveFit:
+    """A hypothesis on entries (3, 8): ln S, ln N, and the error that rounding can make."""
+    s, n, rounding = entries
     every = np.arange(s.size)
+
+    def off(kept: FloatArray) -> FloatArray:
+        return n - np.polyval(fit(s[kept], n[kept])[0], s)
 
     def cost(out: int) -> float:
         rest = np.delete(every, out)
-        return float(((n - np.polyval(fit(s[rest], n[rest])[0], s))[rest] ** 2).sum())
+        return float((off(rest)[rest] ** 2).sum())
 
     gone = min(map(int, every), key=cost) if aside else None
     kept = every if gone is None else np.delete(every, gone)
-    line, values = fit(s[kept], n[kept])
-    residuals = n - np.polyval(line, s)
+    residuals = off(kept)
     # A rounded number is uniform within its half digit; the least error beyond that is likeliest.
-    known = rounding[kept] ** 2 / 3.0
-    beyond = np.concatenate([[0.0], np.geomspace(1e-5, 10.0, 400)])
-    minus2 = min(minus_two_ln_likelihood(residuals[kept], known + t**2) for t in beyond)
+    beyond = np.concatenate([[0.0], np.geomspace(1e-5, 10.0, 400)])[:, None]
+    variance = rounding[kept] ** 2 / 3.0 + beyond**2
+    likelihood = residuals[kept] ** 2 / variance + np.log(2.0 * math.pi * variance)
+    minus2 = float(likelihood.sum(axis=1).min())
     if gone is not None:  # it is off by anything up to `_OUT` either way
         minus2 += 2.0 * math.log(2.0 * _OUT)
-    left_out = []
-    for k in kept:
-        rest = kept[kept != k]
-        left_out.append(abs(n[k] - np.polyval(fit(s[rest], n[rest])[0], s[k])))
-    parameters = count + aside
-    bic = minus2 + penalty(parameters + 1, s.size)
-    return CurveFit(name, parameters, values, residuals, gone, bic, float(np.median(left_out)))
-
-
-def minus_two_ln_likelihood(residuals: FloatArray, variance: FloatArray) -> float:
-    """Of independent normal residuals."""
-    return float((residuals**2 / variance + np.log(2.0 * math.pi * variance)).sum())
+    left_out = float(np.median([abs(off(kept[kept != k])[k]) for k in kept]))
+    bic = minus2 + penalty(count + aside + 1, s.size)
+    values = fit(s[kept], n[kept])[1]
+    return CurveFit(name, count + aside, values, residuals, gone, bic, left_out)
 
 
 def penalty(parameters: int, entries: int) -> float:
