@@ -8,6 +8,7 @@ from importlib.resources import files
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 
 from picchio.paper.claims import Verdict
 from picchio.paper.printed import trials
@@ -33,21 +34,13 @@ def reproduction_page(
     Returns:
         the HTML.
     """
-    from markupsafe import Markup
-
     environment = page_environment("picchio.paper")
-    environment.filters.update(
-        mark=_MARKS.__getitem__,
-        gap=_gap,
-        value=_value,
-        median=_median,
-        rms=_rms,
-        power=lambda x: Markup(power(float(x))),
-    )
-    own = files("picchio.paper") / "page_files" / "page.css"
+    own = {"mark": _MARKS.__getitem__, "value": _value, "median": _median, "rms": _rms}
+    environment.filters.update(own, power=power)
+    sheet = files("picchio.paper") / "page_files" / "page.css"
     holds = (c.page for c in found.claims if c.verdict is Verdict.HOLDS)
     return environment.get_template("page.html.j2").render(
-        style=Markup(environment.globals["style"]) + Markup(own.read_text("utf-8")),
+        style=Markup(environment.globals["style"]) + Markup(sheet.read_text("utf-8")),
         r=found,
         inputs=trials().inputs,
         svg={
@@ -66,18 +59,18 @@ def reproduction_page(
     )
 
 
-def power(value: float) -> str:
-    """A number such as 3.08 x 10^6, as HTML."""
+def power(value: float) -> Markup:
+    """A number such as 3.08 x 10^6, as HTML.
+
+    Args:
+        value: of any size.
+    """
     if not math.isfinite(value):
-        return "∞"
+        return Markup("∞")
     if value == 0 or 1e-3 <= abs(value) < 1e5:
-        return f"{value:.3g}"
+        return Markup(f"{value:.3g}")
     digits, exponent = f"{value:.2e}".split("e")
-    return f"{digits}\N{MULTIPLICATION SIGN}10<sup>{int(exponent)}</sup>"
-
-
-def _gap(value: float | None) -> str:
-    return "–" if value is None else "0" if value == 0 else f"{value:.0e}"
+    return Markup(f"{digits}\N{MULTIPLICATION SIGN}10<sup>{int(exponent)}</sup>")
 
 
 def _value(value: Any) -> str:

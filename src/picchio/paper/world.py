@@ -76,6 +76,8 @@ def parse_assumptions(given: Iterable[str]) -> Assumptions:
     Raises:
         InputError: an unknown name, or a bad value.
     """
+    import pandas
+
     values: dict[str, Any] = {}
     base = vars(Assumptions())
     for word in given:
@@ -84,24 +86,20 @@ def parse_assumptions(given: Iterable[str]) -> Assumptions:
             raise InputError("unknown assumption", key="--assume", value=name, choices=base)
         if not equals:
             raise InputError("must be NAME=VALUE", key="--assume", value=word)
-        key, kind = f"--assume {name}", type(base[name])
-        if kind is str:
-            if text not in trials().inputs[name].choices:
-                choices = trials().inputs[name].choices
+        key, choices = f"--assume {name}", trials().inputs[name].choices
+        if isinstance(base[name], str):
+            if text not in choices:
                 raise InputError("unknown", key=key, value=text, choices=choices)
             values[name] = text
             continue
-        try:
-            number = float(text)
-        except ValueError:
-            number = math.nan
+        number = float(pandas.to_numeric(text, errors="coerce"))
         anywhere = name in ("panel_x", "panel_y", "panel_z", "path_x")
         if not math.isfinite(number) or (number <= 0.0 and not anywhere):
             problem = "must be a finite number, and positive where it is a size"
             raise InputError(problem, key=key, value=text)
-        if kind is int and number != int(number):
+        values[name] = type(base[name])(number)
+        if values[name] != number:
             raise InputError("must be a whole number", key=key, value=text)
-        values[name] = kind(number)
     if values.get("duty", 0.5) >= 1.0:
         raise InputError("must be below 1", key="--assume duty", value=values["duty"])
     return Assumptions(**values)
@@ -160,14 +158,10 @@ def places_of(poses: ArrayLike) -> FloatArray:
 
 def rivet_points(given: Assumptions) -> FloatArray:
     """The rivets of Fig. 12 as assumed, (k, 3) m: row by row from the bottom, to and fro."""
-    across = (np.arange(given.columns) - (given.columns - 1) / 2.0) * given.pitch
-    up = (np.arange(given.rows) - (given.rows - 1) / 2.0) * given.pitch
-    points = [
-        (given.panel_x, given.panel_y + (a if row % 2 == 0 else -a), given.panel_z + b)
-        for row, b in enumerate(up)
-        for a in across
-    ]
-    return np.array(points)
+    across, up = (given.pitch * (np.arange(n) - (n - 1) / 2.0) for n in (given.columns, given.rows))
+    to_and_fro = np.where(np.arange(given.rows)[:, None] % 2, -across, across)
+    y, z = np.broadcast_arrays(given.panel_y + to_and_fro, given.panel_z + up[:, None])
+    return np.stack([np.full(y.size, given.panel_x), y.ravel(), z.ravel()], axis=-1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -332,11 +326,8 @@ class World:
         forces = {"worst": None, **dict(zip("xyz", np.eye(3), strict=True))}
         peaks = {k: 1e3 * self.peaks(poses, n).peak_deflection for k, n in forces.items()}
         shape = (turns, bends, 3)
-        return ReachMap(
-            places_of(poses).reshape(shape),
-            bend,
-            {name: found.reshape(shape) for name, found in peaks.items()},
-        )
+        maps = {name: found.reshape(shape) for name, found in peaks.items()}
+        return ReachMap(places_of(poses).reshape(shape), bend, maps)
 
     def rivet_peaks(self, hits: int | None = None) -> FloatArray:
         """Largest deflections at the rivets, (3 directions, 15 rivets, 3 joints) rad.
