@@ -100,29 +100,24 @@ class Reproduction(TableResult):
 
     def _content(self) -> dict[str, Any]:
         printed = self.study.printed
-        kept = ("unit", "low", "high", "why")
+        assumed = {}
+        for name, entry in trials().inputs.items():
+            kept = {key: getattr(entry, key) for key in ("unit", "low", "high", "why")}
+            own = {"value": getattr(self.study.given, name), "choices": list(entry.choices) or None}
+            assumed[name] = {**own, **kept}
+        arm = printed.arm
+        links = {"mass": arm.masses, "centre_of_gravity": arm.centres_of_gravity}
         return {
             "format": FORMAT,
             "paper": {key: getattr(printed, key) for key in ("title", "journal", "doi")},
-            "assumptions": {
-                name: {
-                    "value": getattr(self.study.given, name),
-                    "choices": list(entry.choices) or None,
-                    **{key: getattr(entry, key) for key in kept},
-                }
-                for name, entry in trials().inputs.items()
-            },
+            "assumptions": assumed,
             "worlds": len(self.study.worlds),
             "counts": self.counts,
             "claims": self._rows(),
             "conflicts": self.conflicts,
             "slips": [{"page": slip.page, "says": slip.says} for slip in printed.slips],
             "equations": self.equations,
-            "table1": {
-                "mass": printed.arm.masses,
-                "centre_of_gravity": printed.arm.centres_of_gravity,
-                "inertia": printed.arm.inertias,
-            },
+            "table1": {**links, "inertia": arm.inertias},
             "table2": self.answer,
             "life": self.study.steps,
             "influence": {entry.name: entry for entry in self.study.influences},
@@ -196,6 +191,9 @@ def answer(study: Study) -> dict[str, Any]:
     base = study.base.rivet_stress.mean(axis=1)
     keeps = min(f.bic for f in table.fits if f.name != OTHER_CURVE)
     kept = next(h for h in comparison.hypotheses if not h.fit.rule.free_exponent)
+    misprint = {"entry": table.misprint, "factor": table.misprint_factor}
+    lead = {"entries_alone": keeps - table.other.bic}
+    lead["with_the_arm"] = kept.bic - comparison.hypotheses[0].bic
     worlds = [f.world for f in comparison.alike if f.cost < 2.0 * comparison.alike[0].cost]
     ranges = {n: [float(w[n]) for w in worlds] for n in (*FREE, "stress_per_twist")}
     return {
@@ -203,15 +201,8 @@ def answer(study: Study) -> dict[str, Any]:
         "base_cycles": printed.cycles(base),
         "fitted_mean_stress": np.asarray(study.fitted.rivet_stress.mean(axis=1)),
         "curve": table.other,
-        "misprint": {
-            "entry": table.misprint,
-            "factor": table.misprint_factor,
-            "nearest_digit": one_digit_off(table),
-        },
-        "lead": {
-            "entries_alone": keeps - table.other.bic,
-            "with_the_arm": kept.bic - comparison.hypotheses[0].bic,
-        },
+        "misprint": {**misprint, "nearest_digit": one_digit_off(table)},
+        "lead": lead,
         "crossing": {"cycles": cycles, "stress": printed.a * cycles**printed.b},
         "shared_variance": printed.b / b,
         "hypotheses": comparison.hypotheses,

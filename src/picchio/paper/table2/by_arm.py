@@ -136,14 +136,12 @@ class Place:
         if within.any():
             mass, jacobian = self.robot.mass_and_jacobian(poses[within].reshape(-1, joints))
             reached = [worlds[k] for k in np.flatnonzero(within)]
-            peak, span = steady_extremes(
-                mass.reshape(-1, rivets, joints, joints),
-                jacobian.reshape(-1, rivets, 3, joints),
-                self.robot.stiffness,
-                np.array([given.damping_ratio for given in reached]),
-                [PulseTrain(printed.task.force, g.period, g.width) for g in reached],
-                printed.directions,
-            )
+            mass = mass.reshape(-1, rivets, joints, joints)
+            jacobian = jacobian.reshape(-1, rivets, 3, joints)
+            ratios = np.array([given.damping_ratio for given in reached])
+            blows = [PulseTrain(printed.task.force, g.period, g.width) for g in reached]
+            own = (self.robot.stiffness, ratios, blows, printed.directions)
+            peak, span = steady_extremes(mass, jacobian, *own)
             found[within] = peak if self.measure == "peak" else span
         return found.reshape(*v.shape[:-1], *found.shape[1:])
 
@@ -264,13 +262,10 @@ class Fit:
     @property
     def world(self) -> dict[str, float | str | int]:
         """The fitted world, by name."""
-        chosen = ("rows", "columns", "elbow", "inertia_about")
-        return {
-            **decode(self.vector[: len(FREE)]),
-            "stress_per_twist": self.stress_per_twist,
-            "exponent": self.exponent,
-            **{n: getattr(self.place.base, n) for n in chosen},
-        }
+        found = {"stress_per_twist": self.stress_per_twist, "exponent": self.exponent}
+        names = ("rows", "columns", "elbow", "inertia_about")
+        chosen = {name: getattr(self.place.base, name) for name in names}
+        return {**decode(self.vector[: len(FREE)]), **found, **chosen}
 
 
 def evaluate(
@@ -362,17 +357,10 @@ class Compared:
 
     def to_dict(self) -> dict[str, Any]:
         """For JSON."""
-        return {
-            "name": self.fit.rule.name,
-            "parameters": self.parameters,
-            "set_aside": self.set_aside,
-            "bic": self.bic,
-            "mean_errors": self.fit.errors[0],
-            "life_errors": self.fit.errors[1],
-            "left_out_mean": self.left_out[0],
-            "left_out_life": self.left_out[1],
-            "world": self.fit.world,
-        }
+        own = {name: getattr(self, name) for name in ("parameters", "set_aside", "bic")}
+        errors = dict(zip(("mean_errors", "life_errors"), self.fit.errors, strict=True))
+        left_out = dict(zip(("left_out_mean", "left_out_life"), self.left_out, strict=True))
+        return {"name": self.fit.rule.name, **own, **errors, **left_out, "world": self.fit.world}
 
 
 @dataclass(frozen=True, eq=False)
