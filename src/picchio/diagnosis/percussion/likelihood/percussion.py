@@ -215,6 +215,9 @@ class Percussion:
 
         Args:
             at: the numbers.
+
+        Returns:
+            in the order of the factors.
         """
         return tuple(one.at(float(u)) for one, u in zip(self.data.base, at.shared, strict=False))
 

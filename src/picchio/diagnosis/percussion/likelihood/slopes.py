@@ -27,7 +27,6 @@ from picchio.model.model import Model
 from picchio.model.sensing import SensorChain
 from picchio.model.system import VibratingSystem
 from picchio.prediction.percussion import (
-    PercussionSetup,
     Struck,
     _differing,
     _slopes_of,
@@ -42,7 +41,6 @@ if TYPE_CHECKING:
 _STEP = 0.05  # of a standard deviation, by which a number is moved
 _TURN = 1e-4  # rad, by which a joint is
 _ALIKE = 1e-7  # of the largest pole: poles nearer than this are one
-_STRUCTURAL = ("structure", "over-time")
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,23 +86,21 @@ class Column:
 
     Attributes:
         kind: "change" of the equations; "force": direction and size; "sensor": how a group reads;
-            "strikes": blows that come and go; "models": two predictions; "none".
+            "strikes": blows that come and go; "none".
         change: of the equations.
         direction: (3,) change of the blows' direction.
         louder: relative change of all blows.
         chains: group -> the sensor before and after.
         strikes: blows.
-        models: before and after.
         size: how far these are apart.
     """
 
-    kind: Literal["change", "force", "sensor", "strikes", "models", "none"]
+    kind: Literal["change", "force", "sensor", "strikes", "none"]
     change: Change | None = None
     direction: FloatArray | None = None
     louder: float = 0.0
     chains: tuple[dict[str, SensorChain], dict[str, SensorChain]] | None = None
     strikes: tuple[Strike, ...] = ()
-    models: tuple[Model, Model] | None = None
     size: float = 1.0
 
 
@@ -228,31 +224,6 @@ class Slopes:
         return cls(tuple(found[k] for k in range(len(of.group_of))))
 
 
-def _linear(setup: PercussionSetup, model: Model, system: VibratingSystem) -> VibratingSystem:
-    """A system whose nonlinear elements are springs and dampers that act most alike.
-
-    Statistical linearisation over the record's own motion (Roberts and Spanos, Random vibration
-    and statistical linearization (1990), chapter 5).
-    """
-    if not system.elements:
-        return system
-    _, motion = setup._motion(model, setup.samples)
-    x, v, a = motion.position, motion.velocity, motion.acceleration
-    times = setup.samples.times
-    force = np.where(times >= 0.0, setup.struck(model).force(times), 0.0)
-    torque = np.outer(force, system.force) - a @ system.mass - v @ system.damping
-    torque = torque - x @ system.stiffness
-    stiffness, damping = system.stiffness.copy(), system.damping.copy()
-    for row in np.unique(system.rows, axis=0):
-        away = np.column_stack([x @ row, v @ row, np.ones(times.size)])
-        scale = np.maximum(np.abs(away).max(axis=0), 1e-300)
-        found = np.linalg.lstsq(away / scale, torque @ row / (row @ row), rcond=None)[0] / scale
-        stiffness += found[0] * np.outer(row, row)
-        damping += found[1] * np.outer(row, row)
-    rows = np.zeros((0, system.rows.shape[1]))
-    return replace(system, stiffness=stiffness, damping=damping, elements=(), rows=rows)
-
-
 class _Pose:
     """The records of one pose at a point: what they have in common is found once."""
 
@@ -262,28 +233,15 @@ class _Pose:
         self.there = {k: of.there(k, at, self.base) for k in records}
         self.setups = {k: self.there[k][0].until(of.end) for k in records}
         self.struck = {k: self.setups[k].struck(self.there[k][1]) for k in records}
-        self.exact = {
+        first = records[0]
+        self.model, self.setup = self.there[first][1], self.setups[first]
+        self.systems = {
             k: self.setups[k]._system(self.there[k][1], self.struck[k].blows) for k in records
         }
-        self.systems = {
-            k: _linear(self.setups[k], self.there[k][1], self.exact[k]) for k in records
-        }
-        first = records[0]
-        self.model, self.setup, self.system = (
-            self.there[first][1],
-            self.setups[first],
-            self.exact[first],
-        )
+        self.system = self.systems[first]
         self.chains = {
             g: self.model.sensors(self.setup.conditions).get(g) for g in self.setup.groups
         }
-        self.drifts = any(e.where == "over-time" for e in self.base)
-
-    def system_of(self, model: Model, k: int) -> VibratingSystem:
-        """Of a model, without its nonlinear elements."""
-        return replace(
-            self.setups[k]._system(model, self.struck[k].blows), elements=(), rows=np.zeros((0, 1))
-        )
 
     def moved(self, one: Inexact, step: float) -> Model:
         """The first record's model with a number of blows or sensors moved on."""
@@ -299,65 +257,48 @@ class _Pose:
 
     # One column each -----------------------------------------------------------------------
 
-    def structural(
-        self, before: Model, after: Model, size: float, effect_drifts: bool = False
-    ) -> list[Column] | None:
-        """Of two models whose equations differ; None where they have other coordinates."""
-        out, known = [], None
-        for k in self.records:
-            if known is None or self.drifts or effect_drifts:
-                b, a = self.system_of(before, k), self.system_of(after, k)
-                if a.coordinates != b.coordinates:
-                    return None
-                known = Column("change", change=Change.between(b, a, size))
-            out.append(known)
-        return out
+    def structural(self, ends: Sequence[Model], size: float) -> list[Column]:
+        """Of two models whose equations differ."""
+        blows = self.struck[self.records[0]].blows
+        b, a = (
+            self.system if model is self.model else self.setup._system(model, blows)
+            for model in ends
+        )
+        return [Column("change", change=Change.between(b, a, size))] * len(self.records)
 
     def inexact(self, one: Inexact) -> list[Column]:
         """By a number that is never exact, of each record."""
         if self.of.light:
             return [_NONE] * len(self.records)
         if one.where == "structure":
-            ends = [
-                _under(self.model, Nudge([(one, np.array([s]))], "structure"))
-                for s in (-_STEP, _STEP)
-            ]
-            found = self.structural(ends[0], ends[1], 2.0 * _STEP)
-            assert found is not None
-            return found
+            after = _under(self.model, Nudge([(one, np.array([_STEP]))], "structure"))
+            return self.structural([self.model, after], _STEP)
         if one.where == POSE:
             index, sigma = one.change
             moved = self.setup.geometry.pose.copy()
             moved[index] += _TURN
-            geometry = self.setup.geometry.beside(moved)
-            size, out, known = _TURN / sigma, [], None
-            for k in self.records:
-                if known is None or self.drifts:
-                    near = replace(self.setups[k], geometry=geometry)
-                    after = near._system(self.there[k][1], self.struck[k].blows)
-                    known = Column(
-                        "change", change=Change.between(self.exact[k], after, size, seen=True)
-                    )
-                out.append(known)
-            return out
+            near = replace(self.setup, geometry=self.setup.geometry.beside(moved))
+            turned = near._system(self.model, self.struck[self.records[0]].blows)
+            change = Change.between(self.system, turned, _TURN / sigma, seen=True)
+            return [Column("change", change=change)] * len(self.records)
         if one.where == "sensor":
             ends = [self.moved(one, s) for s in (-_STEP, _STEP)]
-            return [self.sensor(ends[0], ends[1], 2.0 * _STEP)] * len(self.records)
-        low, high = (0.0, _STEP) if one.one_way else (-_STEP, _STEP)
-        return [
-            self.blows(k, self.moved_of(k, one, low), self.moved_of(k, one, high), high - low)
-            for k in self.records
-        ]
+            return [self.sensor(ends, 2.0 * _STEP)] * len(self.records)
+        return [self.apart(k, one, 0.0 if one.one_way else -_STEP) for k in self.records]
 
-    def sensor(self, before: Model, after: Model, size: float) -> Column:
+    def apart(self, k: int, one: Inexact, low: float) -> Column:
+        """Of a record's blows by a number of theirs, moved from `low` to a step on."""
+        return self.blows(k, [self.moved_of(k, one, s) for s in (low, _STEP)], _STEP - low)
+
+    def sensor(self, ends: Sequence[Model], size: float) -> Column:
         """Of two models whose sensors differ."""
         conditions = self.setup.conditions
-        both = [{g: m.sensors(conditions).get(g) for g in self.chains} for m in (before, after)]
+        both = [{g: m.sensors(conditions).get(g) for g in self.chains} for m in ends]
         return Column("sensor", chains=(both[0], both[1]), size=size)
 
-    def blows(self, k: int, before: Model, after: Model, size: float) -> Column:
+    def blows(self, k: int, ends: Sequence[Model], size: float) -> Column:
         """Of two models whose blows differ."""
-        one, other = self.setups[k].struck(before), self.setups[k].struck(after)
+        one, other = (self.setups[k].struck(model) for model in ends)
         ours = self.struck[k]
         if one.alike(other) and one.alike(ours):
             turned = (other.blows.direction - one.blows.direction) / size
@@ -368,55 +309,13 @@ class _Pose:
 
     def effect(self, now: Effect, ends: Sequence[Effect], size: float) -> list[Column]:
         """By a parameter of an effect."""
-        pairs = {k: [_swapped(self.there[k][1], now, e) for e in ends] for k in self.records}
-        first = pairs[self.records[0]]
-        if now.where in _STRUCTURAL:
-            found = self.structural(first[0], first[1], size) if not self.drifts else None
-            if found is None and self.drifts:
-                found = [
-                    Column("change", change=Change.between(
-                        self.system_of(pair[0], k), self.system_of(pair[1], k), size))
-                    for k, pair in pairs.items()
-                ]  # fmt: skip
-            if found is not None:
-                return found
-        if now.where == "blows":
-            return [self.blows(k, pairs[k][0], pairs[k][1], size) for k in self.records]
-        if now.where == "sensor" and self.plain(first):
-            return [self.sensor(first[0], first[1], size)] * len(self.records)
-        return [
-            Column("models", models=(pairs[k][0], pairs[k][1]), size=size) for k in self.records
-        ]
 
-    def plain(self, models: Sequence[Model]) -> bool:
-        """Whether sensors of all models differ from today's in place, axes and gain alone."""
-        for model in models:
-            for g, now in self.chains.items():
-                other = model.sensors(self.setup.conditions).get(g)
-                if replace(other, place=now.place, turn=now.turn, gain=now.gain) != now:
-                    try:
-                        same = (
-                            other.mount,
-                            other.highpass,
-                            other.lowpass,
-                            other.delay,
-                            other.clock_rate,
-                            other.limit,
-                            other.hum,
-                        ) == (
-                            now.mount,
-                            now.highpass,
-                            now.lowpass,
-                            now.delay,
-                            now.clock_rate,
-                            now.limit,
-                            now.hum,
-                        )
-                    except ValueError:
-                        same = False
-                    if not same:
-                        return False
-        return True
+        def pair(k: int) -> list[Model]:
+            return [_swapped(self.there[k][1], now, end) for end in ends]
+
+        if now.where == "structure":
+            return self.structural(pair(self.records[0]), size)
+        return [self.blows(k, pair(k), size) for k in self.records]
 
     # All together ----------------------------------------------------------------------------
 
@@ -442,8 +341,7 @@ class _Pose:
                     sigma = float(getattr(of.data.problem.campaign.tolerance, one.key))
                     blows.append((sigma, one.key == "blow_time", blow))
                 else:
-                    low, high = (self.moved_of(k, one, s) for s in (-_STEP, _STEP))
-                    head.append(self.blows(k, low, high, 2.0 * _STEP))
+                    head.append(self.apart(k, one, -_STEP))
             columns = head + [c[i] for c in tail]
             found[k] = _Record(self, k).slopes(columns, blows)
         return found
@@ -470,10 +368,10 @@ class _Record:
         setup, own, channels = self.setup, self.own, self.own.channels
         count = setup.samples.count
         weighed = [c for c in columns if c.kind in ("change", "force", "sensor", "none")]
-        listed = [c for c in columns if c.kind in ("strikes", "models")]
+        listed = [c for c in columns if c.kind == "strikes"]
         places, a, b = [], 0, len(weighed)
         for c in columns:
-            if c.kind in ("strikes", "models"):
+            if c.kind == "strikes":
                 places.append(b)
                 b += 1
             else:
@@ -491,12 +389,7 @@ class _Record:
         series_of: dict[object, tuple[Any, ...]] = {}
         for group, rows in members.items():
             first = channels[rows[0]]
-            chain = (
-                self.pose.chains[group]
-                if not self.pose.drifts
-                else self.model.sensors(setup.conditions).get(group)
-            )
-            taken = setup._taken(first, chain)
+            taken = setup._taken(first, self.pose.chains[group])
             chain, key = taken.chain, (taken.samples, taken.at_jumps)
             if key not in series_of:
                 plan = setup._plan(self.struck, self.system, *key)
@@ -604,8 +497,6 @@ class _Record:
             block = through(replace(chain), block)  # (rows, 2m + 1)
             mine = iter(blows)
             for e, c in enumerate(listed):
-                if c.kind != "strikes":
-                    continue
                 if c.strikes or c.size != 1.0:
                     values = block @ strikes.series(c.strikes) / c.size
                 else:
@@ -617,21 +508,6 @@ class _Record:
                     ]
                 for r, i in enumerate(rows):
                     explicit[e, i] = _whitened(values[r][None], noise[r], dead[r], free, unknown)[0]
-        now_left: FloatArray | None = None
-        for e, c in enumerate(listed):
-            if c.kind != "models" or c.models is None:
-                continue
-            before, after = c.models
-            try:
-                if before is self.model:
-                    if now_left is None:
-                        now_left = self.of.residual(self.k, self.record, before)
-                    start = now_left
-                else:
-                    start = self.of.residual(self.k, self.record, before)
-                explicit[e] = (start - self.of.residual(self.k, self.record, after)) / c.size
-            except InputError:
-                explicit[e] = 0.0
         return RecordSlopes(tuple(families), explicit, np.array(places, dtype=np.intp))
 
     def _weights(
