@@ -9,20 +9,8 @@ from typing import Any
 import numpy as np
 
 from picchio.campaign.channels import Channel
-from picchio.campaign.source import Block, Column, FileSource, Layout, Samples
-from picchio.core.errors import InputError
+from picchio.campaign.source import Block, Column, FileSource, Layout, Samples, library
 from picchio.core.processes import memory_size
-
-
-def _pyarrow() -> tuple[Any, Any]:
-    try:
-        import pyarrow
-        import pyarrow.parquet
-    except ImportError:
-        raise InputError("Parquet files need pyarrow", hint="pip install 'picchio[parquet]'") from (
-            None
-        )
-    return pyarrow, pyarrow.parquet
 
 
 class ParquetSource(FileSource):
@@ -32,10 +20,11 @@ class ParquetSource(FileSource):
 
     def __init__(self, path: Path, key: str = "record", layout: Layout | None = None) -> None:
         super().__init__(path, key, layout)
-        arrow, _ = _pyarrow()
+        import pyarrow.types
+
         for name, column in self.columns.items():
             kind = self._schema.types[column.index]
-            if not (arrow.types.is_floating(kind) or arrow.types.is_integer(kind)):
+            if not (pyarrow.types.is_floating(kind) or pyarrow.types.is_integer(kind)):
                 raise self.error("must be a column of numbers", channel=name, value=str(kind))
 
     def names(self) -> list[str]:
@@ -47,31 +36,27 @@ class ParquetSource(FileSource):
         return list(self._schema.names)
 
     def _open(self) -> Any:
-        arrow, parquet = _pyarrow()
         path = self.checked_path()
-        try:
-            return parquet.ParquetFile(path)
-        except (arrow.ArrowException, OSError, ValueError) as error:
-            reason = str(error).partition("\n")[0]
-            raise self.error(f"is not a readable Parquet file: {reason}") from None
+        with library("Parquet file", "pyarrow", path, self.key, extra="parquet"):
+            import pyarrow.parquet
+
+            return pyarrow.parquet.ParquetFile(path)
 
     def blocks(self, names: Sequence[str], size: int) -> Iterator[Block]:
         """As `Source`; reads only the columns needed, one row group at a time."""
-        arrow, _ = _pyarrow()
         wanted = [self.columns[name] for name in names]
         headers = [self._schema.names[column.index] for column in wanted]
-        with self._open() as file:
-            first = 0
-            try:
-                # Over all groups at once pyarrow (26) keeps what it has read.
-                for group in range(file.num_row_groups):
-                    self._require_room(file.metadata.row_group(group), headers, first)
-                    for batch in file.iter_batches(size, row_groups=[group], columns=headers):
-                        yield first, self._converted(wanted, batch, first)
-                        first += batch.num_rows
-            except (arrow.ArrowException, OSError) as error:
-                reason = str(error).partition("\n")[0]
-                raise self.error(f"cannot be read: {reason}", sample=first) from None
+        first = 0
+        with (
+            self._open() as file,
+            library("Parquet file", "pyarrow", self.path, self.key, extra="parquet"),
+        ):
+            # Over all groups at once pyarrow (26) keeps what it has read.
+            for group in range(file.num_row_groups):
+                self._require_room(file.metadata.row_group(group), headers, first)
+                for batch in file.iter_batches(size, row_groups=[group], columns=headers):
+                    yield first, self._converted(wanted, batch, first)
+                    first += batch.num_rows
 
     def _require_room(self, group: Any, headers: list[str], first: int) -> None:
         """Refuse a row group that needs more than half of the memory, before it is read."""
@@ -101,9 +86,10 @@ class ParquetSource(FileSource):
 
 def write_parquet(path: Path, channels: Sequence[Channel], blocks: Iterable[Samples]) -> None:
     """Write a record in float64, bit for bit."""
-    arrow, parquet = _pyarrow()
-    schema = arrow.schema([(channel.header, arrow.float64()) for channel in channels])
-    with parquet.ParquetWriter(path, schema) as writer:
+    with library("Parquet file", "pyarrow", path, extra="parquet"):
+        import pyarrow.parquet
+    schema = pyarrow.schema([(channel.header, pyarrow.float64()) for channel in channels])
+    with pyarrow.parquet.ParquetWriter(path, schema) as writer:
         for block in blocks:
-            arrays = [arrow.array(block[channel.name]) for channel in channels]
-            writer.write_table(arrow.Table.from_arrays(arrays, schema=schema))
+            arrays = [pyarrow.array(block[channel.name]) for channel in channels]
+            writer.write_table(pyarrow.Table.from_arrays(arrays, schema=schema))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,6 +18,38 @@ from picchio.core.units import Conversion
 
 Samples = dict[str, FloatArray]
 Block = tuple[int, Samples]
+Arrays = Mapping[str, FloatArray] | Callable[[], Mapping[str, FloatArray]]
+
+
+@contextmanager
+def library(
+    kind: str, needs: str, path: Path, key: str | None = None, *, extra: str = "import"
+) -> Iterator[None]:
+    """Whatever a library raises of a file, or that it is not there, becomes one line.
+
+    Args:
+        kind: of file, such as "Parquet file".
+        needs: the libraries that read it.
+        path: the file.
+        key: the record's name in messages.
+        extra: which of picchio's extras brings the libraries.
+
+    Returns:
+        a context manager.
+
+    Raises:
+        InputError: a library is missing, or the file is none of its kind, or damaged.
+    """
+    try:
+        yield
+    except (MemoryError, InputError):
+        raise
+    except ImportError:
+        raise InputError(f"{kind}s need {needs}", file=path, key=key,
+                         hint=f"pip install 'picchio[{extra}]'") from None  # fmt: skip
+    except Exception as error:  # the libraries' own kinds, and whatever damage makes
+        said = str(error).partition("\n")[0] or type(error).__name__
+        raise InputError(f"is not a readable {kind}: {said}", file=path, key=key) from None
 
 
 @dataclass(frozen=True)
@@ -200,7 +233,7 @@ class MemorySource(Source):
     def __init__(
         self,
         channels: Sequence[Channel],
-        arrays: Mapping[str, FloatArray] | Callable[[], Mapping[str, FloatArray]],
+        arrays: Arrays,
         key: str = "record",
         layout: Layout | None = None,
     ) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from picchio.campaign.channels import FREQUENCY, parse_channel
-from picchio.campaign.source import Layout, MemorySource
+from picchio.campaign.source import Layout, MemorySource, library
 from picchio.campaign.tables import RecordTable
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError, warn_user
@@ -35,20 +35,16 @@ def data_sets(path: Path) -> list[dict[str, Any]]:
     Raises:
         InputError: pyuff is missing, or the file is no universal file.
     """
-    try:
+    # pyuff prints as it reads.
+    with (
+        library("universal file", "pyuff", path),
+        contextlib.redirect_stdout(io.StringIO()),
+        warnings.catch_warnings(),
+    ):
         import pyuff
-    except ImportError:
-        raise InputError("UFF files need pyuff", hint="pip install 'picchio[import]'") from None
-    try:
-        # pyuff prints as it reads.
-        with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            found = pyuff.UFF(str(path)).read_sets()
-    except MemoryError:
-        raise
-    except Exception as error:  # pyuff raises bare Exceptions
-        said = str(error).partition("\n")[0] or type(error).__name__
-        raise InputError(f"is not a readable universal file: {said}", file=path) from None
+
+        warnings.simplefilter("ignore")
+        found = pyuff.UFF(str(path)).read_sets()
     return [found] if isinstance(found, dict) else list(found)
 
 

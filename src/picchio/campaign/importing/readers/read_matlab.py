@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from picchio.campaign.importing.isolated import Limits
-from picchio.campaign.importing.raw import RawFile, columns_of, reason
+from picchio.campaign.importing.raw import RawFile, columns_of
+from picchio.campaign.source import library
 from picchio.core.errors import InputError
 
 LIMITS = Limits(seconds_a_byte=2.5e-7)
@@ -26,16 +27,12 @@ def read(path: Path, clock: Mapping[str, Any]) -> RawFile:
         from matio import load_from_mat as load
     except ImportError:
         from scipy.io import loadmat as load
-    try:
-        content = load(path)
-    except NotImplementedError:
-        raise InputError("is a version 7.3 file (HDF5), which needs mat-io", file=path,
-                         hint="pip install 'picchio[import]', or save it with '-v7'"
-                         ) from None  # fmt: skip
-    except MemoryError:
-        raise
-    except Exception as error:  # a damaged file may raise anything
-        problem = f"is not a readable .mat file: {reason(error)}"
-        raise InputError(problem, file=path) from None
+    with library(".mat file", "scipy", path):
+        try:
+            content = load(path)
+        except NotImplementedError:
+            raise InputError("is a version 7.3 file (HDF5), which needs mat-io", file=path,
+                             hint="pip install 'picchio[import]', or save it with '-v7'"
+                             ) from None  # fmt: skip
     named = {name: value for name, value in content.items() if not name.startswith("__")}
     return RawFile.of(path, "matlab", columns_of("", named))

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from picchio.campaign.importing.isolated import Limits
-from picchio.campaign.importing.raw import RawFile, columns_of, reason
-from picchio.core.errors import InputError
+from picchio.campaign.importing.raw import RawFile, columns_of
+from picchio.campaign.source import library
 from picchio.core.tables import Column, Left
 
 LIMITS = Limits(memory_a_byte=64.0)
@@ -27,13 +27,8 @@ def read(path: Path, clock: Mapping[str, Any]) -> RawFile:
     Raises:
         InputError: no archive, or one without numbers.
     """
-    try:
-        columns = list(_columns(path))
-    except MemoryError:
-        raise
-    except Exception as error:  # zipfile's and numpy's own kinds
-        raise InputError(f"is not a readable .npz file: {reason(error)}", file=path) from None
-    return RawFile.of(path, "npz", columns)
+    with library(".npz file", "numpy", path):
+        return RawFile.of(path, "npz", _columns(path))
 
 
 def _columns(path: Path) -> Iterator[Column | Left]:
