@@ -6,6 +6,7 @@ which are series, which are text, which are single numbers, and what is left out
 
 from __future__ import annotations
 
+import contextlib
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
@@ -14,8 +15,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas
 
-from picchio.core.arrays import FloatArray
+from picchio.core.arrays import BoolArray, FloatArray
 from picchio.core.dates import MISSING, NS
 from picchio.core.errors import InputError
 from picchio.core.tables import Column, Left, Table, gathered, typed
@@ -128,8 +130,9 @@ class RawFile:
 
     @property
     def rows(self) -> int:
-        """Samples of the first series: a table's rows."""
-        return next((c.values.size for c in self.channels.values()), 0)
+        """Of a table; 0 where its series differ in length."""
+        sizes = {len(c.values) for c in self.channels.values()} | set(map(len, self.texts.values()))
+        return sizes.pop() if len(sizes) == 1 else 0
 
     @property
     def told(self) -> tuple[str, ...]:
@@ -161,18 +164,18 @@ class RawFile:
         """The same with some of a table's rows.
 
         Args:
-            rows: (m,) whether each is there, or which.
+            rows: (m,) whether each is there; series of another length stay as they are.
         """
         channels = {
-            n: c if c.time is not None else replace(c, values=c.values[rows])
-            for n, c in self.channels.items()
-        }
-        texts = {name: cells[rows] for name, cells in self.texts.items()}
+            n: replace(c, values=c.values[rows]) if c.time is None and len(c.values) == len(rows)
+            else c for n, c in self.channels.items()
+        }  # fmt: skip
+        texts = {n: x[rows] if len(x) == len(rows) else x for n, x in self.texts.items()}
         return replace(self, channels=channels, texts=texts)
 
 
 def below(parts: list[RawFile]) -> RawFile:
-    """Blocks of a table as one.
+    """Blocks of a table as one; a series that some of them lack is left out, and told.
 
     Args:
         parts: in their order.
@@ -183,107 +186,172 @@ def below(parts: list[RawFile]) -> RawFile:
     first = parts[0]
     if len(parts) == 1:
         return first
-    channels = {
-        n: replace(c, values=np.concatenate([p.channels[n].values for p in parts]))
-        for n, c in first.channels.items() if all(n in p.channels for p in parts)
-    }  # fmt: skip
-    texts = {
-        n: np.concatenate([p.texts[n] for p in parts])
-        for n in first.texts if all(n in p.texts for p in parts)
-    }  # fmt: skip
-    left = gathered(one for part in parts for one in part.left)
+    found: dict[tuple[str, bool], list[Any]] = {}
+    for part in parts:
+        for name, channel in part.channels.items():
+            found.setdefault((name, False), []).append(channel.values)
+        for name, cells in part.texts.items():
+            found.setdefault((name, True), []).append(cells)
+    whole = {key: np.concatenate(v) for key, v in found.items() if len(v) == len(parts)}
+    channels = {n: replace(c, values=whole[n, False]) for n, c in first.channels.items()
+                if (n, False) in whole}  # fmt: skip
+    texts = {name: whole[name, True] for name in first.texts if (name, True) in whole}
+    lost = [
+        Left("not in all parts of the file", sum(map(_count, v)), 1, str(v[0][0]), len(v), key[0],
+             "row") for key, v in found.items() if key not in whole
+    ]  # fmt: skip
+    left = gathered([*(one for part in parts for one in part.left), *lost])
     return replace(first, channels=channels, texts=texts, left=left)
 
 
 def columns_of(
-    name: str, value: Any, depth: int = _DEEPEST, *, table: bool = False
+    name: str,
+    value: Any,
+    depth: int = _DEEPEST,
+    *,
+    table: bool = False,
+    kinds: dict[str, str] | None = None,
 ) -> Iterator[Column | Left]:
     """What a value of a MATLAB, NumPy, Parquet or JSON file holds, as columns.
 
     A field of a struct is `name.field`; of a matrix, or of a column of lists, `name(1)`, `name(2)`,
     ... along its shorter side. Dates are ns from 1970, True is 1. A single number is a "scalar".
+    Objects of Python are what most of them are, as the cells of a table of text. Whatever becomes
+    no value of a column is told.
 
     Args:
         name: of the value; empty for a whole file.
         value: array, list, table, or dictionary of them.
         depth: how many structs may stand in one another.
         table: whether it is a table, of which one row is a series, too.
+        kinds: what columns of objects hold, as the blocks before told; added to.
 
     Returns:
         the columns, and what is none of them.
     """
+    kinds = {} if kinds is None else kinds
     if hasattr(value, "to_dict") and hasattr(value, "columns"):  # a table of pandas
         index = value.index
         named = {} if index.dtype.kind not in "mM" else {index.name or "index": index.to_numpy()}
         value, table = named | {str(key): value[key].to_numpy() for key in value.columns}, True
-    if isinstance(value, dict) or hasattr(value, "_fieldnames"):
-        parts = value if isinstance(value, dict) else vars(value)
-        for key, part in parts.items() if depth else ():
-            yield from columns_of(
-                f"{name}.{key}" if name else str(key), part, depth - 1, table=table
-            )
-        return
-    try:
-        array = np.asarray(value)
-    except ValueError:  # lists of several lengths
-        array = np.empty(0)
-    if array.dtype.names and array.size == 1:
-        record = array.ravel()[0]
-        yield from columns_of(name, {n: record[n] for n in array.dtype.names}, depth, table=table)
-        return
+    array: Any = np.empty(0) if isinstance(value, dict) else _array(value)
+    cells = [_single(cell) for cell in array.ravel().tolist()] if array.dtype.kind == "O" else []
     if array.dtype.names:
-        yield from columns_of(name, {n: array[n] for n in array.dtype.names}, depth, table=table)
+        record: Any = array.ravel()[0] if array.size == 1 else array
+        value = {key: record[key] for key in array.dtype.names}
+    elif cells and all(isinstance(cell, dict) for cell in cells):
+        keys = dict.fromkeys(key for cell in cells for key in cell)
+        value = {key: [cell.get(key) for cell in cells] for key in keys}
+    if isinstance(value, dict):
+        for key, part in value.items():
+            own = f"{name}.{key}" if name else str(key)
+            if depth:
+                yield from columns_of(own, part, depth - 1, table=table, kinds=kinds)
+            else:
+                yield Left(f"more than {_DEEPEST} levels deep", 1, 1, "", 1, own, "row")
         return
-    if array.dtype.kind == "O":
-        array = _plain(array)
-        if isinstance(array, dict):
-            yield from columns_of(name, array, depth, table=table)
+    if any(isinstance(cell, (list, tuple, np.ndarray)) for cell in cells):
+        lists: list[Any] = [np.ravel(cell) for cell in cells if cell is not None]
+        width = lists[0].size
+        if any(one.size != width or one.dtype.kind not in "iufb" for one in lists):
+            why, count = "lists of several lengths, or of no numbers", sum(map(len, lists))
+            yield Left(why, count, 1, str(cells[0])[:60], len(cells), name, "row")
             return
+        nothing = np.full(width, np.nan)
+        array = np.array([nothing if c is None else np.ravel(c) for c in cells], dtype=np.float64)
+    vector = array.size == max(array.shape, default=1) and (array.size > 1 or table)
+    if vector and array.dtype.kind in "OUS":
+        cells = cells or [str(cell) for cell in array.astype(str).ravel()]
+        yield from _of_cells(name, cells, kinds)
+        return
+    with contextlib.suppress(TypeError, ValueError, OverflowError):
+        array = np.array(cells, dtype=np.float64).reshape(array.shape) if cells else array
     kind = array.dtype.kind
-    if kind in "US" or array.dtype == object:
-        cells = [str(cell).strip() for cell in array.ravel()]
-        if array.ndim <= 1 and array.dtype != object and len(cells) > 1:
-            yield typed(name, cells)
-        else:
-            yield Left("no numbers", array.size, 1, cells[0][:60] if cells else "", 1, name, "row")
+    if kind in "OUScV" or array.ndim > 2:
+        what = {"c": "complex numbers", "V": "bytes"}.get(kind, "no numbers")
+        what = f"an array of {array.ndim} dimensions" if array.ndim > 2 else what
+        text = str(array.ravel()[0])[:60] if array.size else ""
+        yield Left(what, array.size, 1, text, 1, name, "row")
         return
-    if kind in "cV" or array.ndim > 2:
-        what = "complex numbers" if kind == "c" else f"an array of {array.ndim} dimensions"
-        yield Left(what, array.size, 1, str(array.ravel()[:1])[1:-1], 1, name, "row")
-        return
-    dated = {"M": "date", "m": "clock"}.get(kind, "number")
-    if kind in "mM":
-        array = array.astype(f"{kind}8[ns]").astype(np.int64)
-    if array.size == 1 and dated == "number" and not table:
+    if array.size == 1 and kind not in "mM" and not table:
         yield Column(name, "scalar", array.ravel()[0])
         return
     if array.size == 0:
         return
+    dated = {"M": "date", "m": "clock"}.get(kind, "number")
+    if kind in "mM":
+        array = array.astype(f"{kind}8[ns]").astype(np.int64)
     # A recording has more samples than channels.
-    rows = np.atleast_2d(array if array.ndim == 1 or array.shape[0] <= array.shape[1] else array.T)
+    upright = array.ndim == 2 and (table or array.shape[0] > array.shape[1])
+    rows = np.atleast_2d(array.T if upright else array)
     for i, row in enumerate(rows, start=1):
         own = name if array.ndim < 2 or len(rows) == 1 else f"{name}({i})"
-        exact = dated != "number" or (row.dtype.kind in "iu" and abs(int(row[0])) >= _EXACT)
-        yield Column(own, dated, row.astype(np.int64 if exact else np.float64),
-                     "ns" if dated != "number" else None)  # fmt: skip
+        exact = dated != "number" or (
+            row.dtype.kind in "iu" and _EXACT <= int(row.max()) <= np.iinfo(np.int64).max
+        )
+        values = row.astype(np.int64 if exact else np.float64)
+        yield from _told(Column(own, dated, values, "ns" if dated != "number" else None))
 
 
-def _plain(array: Any) -> Any:
-    """An array of Python's objects as numbers, text or, of dictionaries, as arrays by key."""
-    cells = array.ravel().tolist()
-    if cells and all(isinstance(cell, dict) for cell in cells):
-        keys = dict.fromkeys(key for cell in cells for key in cell)
-        return {key: np.array([cell.get(key) for cell in cells], dtype=object) for key in keys}
-    if cells and all(isinstance(cell, str) or cell is None for cell in cells):
-        return np.array([cell or "" for cell in cells])
+def _single(cell: Any) -> Any:
+    """What stands in a cell of a cell array: a single number or text, an array, or nothing."""
+    while isinstance(cell, np.ndarray) and cell.size == 1 and not cell.dtype.names:
+        cell = cell.item()
+    return None if isinstance(cell, (list, tuple, np.ndarray)) and not np.size(cell) else cell
+
+
+def _array(value: Any) -> Any:
+    """A value as an array; lists of several lengths as one of objects."""
     try:
-        return np.array(cells, dtype=np.float64).reshape(*array.shape, -1).squeeze(axis=-1)
-    except (ValueError, TypeError):
-        pass
-    try:
-        return np.array([np.ravel(cell) for cell in cells], dtype=np.float64)
-    except (ValueError, TypeError):
+        return np.asarray(value)
+    except ValueError:
+        array: Any = np.empty(len(value), dtype=object)
+        array[:] = value
         return array
+
+
+def _of_cells(name: str, cells: list[Any], kinds: dict[str, str]) -> Iterator[Column | Left]:
+    """A column of single objects of Python: numbers, or what their text says."""
+    found, texts = None, None
+    if kinds.get(name, "number") == "number" and not any(isinstance(c, str) for c in cells):
+        with contextlib.suppress(TypeError, ValueError, OverflowError):
+            found = Column(name, "number", np.array(cells, dtype=np.float64))
+    if found is None:
+        empty = pandas.isna(np.array(cells, dtype=object))
+        texts = ["" if none else _text(cell) for cell, none in zip(cells, empty, strict=True)]
+        found = typed(name, texts, kind=kinds.get(name))
+    if texts is None or any(texts):
+        kinds[name] = found.kind
+    yield from _told(found, texts)
+
+
+def _text(cell: Any) -> str:
+    return (cell.decode(errors="replace") if isinstance(cell, bytes) else str(cell)).strip()
+
+
+def _gone(values: Any) -> BoolArray:
+    """(m,) whether a value is missing; none is of text."""
+    if values.dtype.kind == "f":
+        return np.asarray(~np.isfinite(values))
+    return (
+        np.asarray(values == MISSING) if values.dtype.kind == "i" else np.zeros(len(values), bool)
+    )
+
+
+def _count(values: Any) -> int:
+    return int((~_gone(values)).sum())
+
+
+def _told(column: Column, texts: list[str] | None = None) -> Iterator[Column | Left]:
+    """A column with NaN where a value is not finite, and what of it is no number or no date."""
+    values, gone = column.values, _gone(column.values)
+    if values.dtype.kind == "f" and gone.any():
+        column = replace(column, values=np.where(gone, np.nan, values))
+    yield column
+    for first in np.flatnonzero(gone)[:1]:
+        text = texts[first] if texts else "" if column.kind != "number" else str(values[first])
+        count = int(gone.sum())
+        yield Left("no number", count, int(first) + 1, text, count, column.name, "row")
 
 
 def _paired(channels: dict[str, RawChannel], kinds: dict[str, str]) -> dict[str, RawChannel]:
@@ -336,12 +404,3 @@ def _seconds_and(first: RawChannel, second: RawChannel) -> FloatArray | None:
     sure = rest is not None or (a[0] >= 978_307_200 and np.median(steps) >= 1000
                                 and steps.min() >= 0 and not (np.diff(a) > 0).all())  # fmt: skip
     return ns if sure else None
-
-
-def reason(error: Exception) -> str:
-    """What a reader's library says is wrong, in one line.
-
-    Args:
-        error: as it raised.
-    """
-    return str(error).partition("\n")[0] or type(error).__name__

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import bz2
+import io
 import sqlite3
-import struct
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from picchio.campaign.importing.isolated import Limits
 from picchio.campaign.importing.raw import RawFile
 from picchio.campaign.importing.readers.ros_messages import Series, Topic, collected, definitions
-from picchio.core.errors import InputError
 
 LIMITS = Limits(seconds_a_byte=1e-5, memory_a_byte=32.0)
-_WORDS = "ROS bag"
+_WHAT = ("ROS bag", "rosbags")
 _SQLITE = b"SQLite format 3\0"
 _BAG = b"#ROSBAG V2.0\n"
 _MESSAGE, _BEGIN, _CHUNK, _CONNECTION = 2, 3, 5, 7  # kinds of record
-_LARGEST = 1 << 31  # bytes of a record; damage asks for more
 _SOME = 1000  # messages
 
 
@@ -36,7 +33,7 @@ def read(path: Path, clock: Mapping[str, Any]) -> RawFile:
     Raises:
         InputError: rosbags is missing, the file is no bag or cut short, or holds no number.
     """
-    return next(collected(Series(path, "bag", clock), _fill, _WORDS, whole=True))
+    return next(collected(Series(path, "bag", clock), _fill, _WHAT, whole=True))
 
 
 def blocks(path: Path, clock: Mapping[str, Any], names: set[str] | None) -> Iterator[RawFile]:
@@ -50,117 +47,72 @@ def blocks(path: Path, clock: Mapping[str, Any], names: set[str] | None) -> Iter
     Raises:
         InputError: as `read`.
     """
-    return collected(Series(path, "bag", clock, names), _fill, _WORDS, whole=False)
+    return collected(Series(path, "bag", clock, names), _fill, _WHAT, whole=False)
 
 
 def _fill(series: Series) -> Iterator[None]:
-    try:
-        import rosbags.typesys  # noqa: F401
-    except ImportError:
-        raise InputError("ROS bags need rosbags", file=series.path,
-                         hint="pip install 'picchio[import]'") from None  # fmt: skip
+    import rosbags.typesys  # noqa: F401  # before the file is looked at
+
     with open(series.path, "rb") as file:
-        if file.read(len(_SQLITE)) != _SQLITE:
-            file.seek(0)
-            yield from _ros1(file, series)
+        if file.read(len(_SQLITE)) == _SQLITE:
+            yield from _ros2(series)
             return
-    yield from _ros2(series)
+        file.seek(0)
+        if file.read(len(_BAG)) != _BAG:
+            raise ValueError("it does not begin as a bag of version 2.0")
+        claimed = chunks = 0
+        topics: dict[int, Topic | None] = {}
+        for head, data in _records(file):
+            if head["op"][0] == _BEGIN:
+                claimed = head.get_uint32("chunk_count")
+                if not head.get_uint64("index_pos"):
+                    raise ValueError("it was not closed; reindex it first")
+            elif head["op"][0] == _CHUNK:
+                chunks += 1
+                for inner, message in _records(_unpacked(head, data)):
+                    _taken(inner, message, topics, series)
+                yield
+            else:
+                _taken(head, data, topics, series)
+        if chunks != claimed:
+            raise ValueError(f"it holds {chunks} of {claimed} chunks")
 
 
-def _ros1(file: BinaryIO, series: Series) -> Iterator[None]:
-    """A chunk at a time, in the order of the file, without its index, which may be large.
+def _records(file: io.BufferedReader) -> Iterator[tuple[Any, bytes]]:
+    """Header and data of each, in the order of the file, without its index, which may be large.
 
     Source: the ROS wiki, "Bags/Format/2.0".
     """
-    if file.read(len(_BAG)) != _BAG:
-        raise ValueError("it does not begin as a bag of version 2.0")
-    topics: dict[int, Topic | None] = {}
-    claimed, chunks = -1, 0
-    while (record := _record(file)) is not None:
-        head, data = record
-        kind = head["op"][0]
-        if kind == _BEGIN:
-            claimed = _whole(head["chunk_count"])
-            if not _whole(head["index_pos"]):
-                raise ValueError("it was not closed; reindex it first")
-        elif kind == _CONNECTION:
-            _connect(head, data, topics, series)
-        elif kind == _CHUNK:
-            chunks += 1
-            _inside(_unpacked(head["compression"], data), topics, series)
-            yield
-    if chunks != claimed:
-        raise ValueError(f"it holds {chunks} of {claimed} chunks")
+    from rosbags.rosbag1.reader import Header, read_bytes, read_uint32
+
+    while file.peek(1):
+        head = Header.read(file)
+        yield head, read_bytes(file, read_uint32(file))
 
 
-def _unpacked(how: bytes, data: bytes) -> bytes:
-    if how == b"bz2":
-        return bz2.decompress(data)
-    if how == b"lz4":
-        import lz4.frame  # type: ignore[import-untyped]
+def _unpacked(head: Any, data: bytes) -> io.BufferedReader:
+    """The records of a chunk."""
+    from rosbags.rosbag1.reader import decompressors
 
-        return bytes(lz4.frame.decompress(data))
-    if how != b"none":
+    if (how := head.get_string("compression")) not in decompressors:
         raise ValueError(f"its compression {how!r} is not known")
-    return data
+    return io.BufferedReader(io.BytesIO(decompressors[how](data)))
 
 
-def _inside(data: bytes, topics: dict[int, Topic | None], series: Series) -> None:
-    at = 0
-    while at < len(data):
-        (size,) = struct.unpack_from("<I", data, at)
-        head = _fields(data[at + 4 : at + 4 + size])
-        (length,) = struct.unpack_from("<I", data, at + 4 + size)
-        begin = at + 8 + size
-        at = begin + length
-        if at > len(data):
-            raise ValueError("a record goes beyond its chunk")
-        if head["op"][0] == _CONNECTION:
-            _connect(head, data[begin:at], topics, series)
-        elif head["op"][0] == _MESSAGE:
-            topic = topics[_whole(head["conn"])]
-            if topic is not None:
-                seconds, rest = struct.unpack("<II", head["time"])
-                topic.data.append(data[begin:at])
-                topic.logged.append(seconds * 1_000_000_000 + rest)
+def _taken(head: Any, data: bytes, topics: dict[int, Topic | None], series: Series) -> None:
+    """Take a message, or what a connection says of those that come."""
+    from rosbags.rosbag1.reader import Header
 
-
-def _connect(
-    head: dict[str, bytes], data: bytes, topics: dict[int, Topic | None], series: Series
-) -> None:
-    number = _whole(head["conn"])
-    if number not in topics:
-        about = _fields(data)
-        kind = about["type"].decode().replace("/", "/msg/")
-        fields = definitions(about["message_definition"].decode(), kind, ros1=True)
-        topics[number] = series.topic(head["topic"].decode(), kind, fields, ros1=True)
-
-
-def _record(file: BinaryIO) -> tuple[dict[str, bytes], bytes] | None:
-    parts: list[bytes] = []
-    for _ in range(2):
-        length = file.read(4)
-        if not length and not parts:
-            return None
-        (size,) = struct.unpack("<I", length)
-        parts.append(file.read(size) if size < _LARGEST else b"")
-        if len(parts[-1]) < size:
-            raise ValueError("it is cut short")
-    return _fields(parts[0]), parts[1]
-
-
-def _fields(data: bytes) -> dict[str, bytes]:
-    found, at = {}, 0
-    while at < len(data):
-        (size,) = struct.unpack_from("<I", data, at)
-        name, _, value = data[at + 4 : at + 4 + size].partition(b"=")
-        found[name.decode()] = value
-        at += 4 + size
-    return found
-
-
-def _whole(value: bytes) -> int:
-    return int.from_bytes(value, "little")
+    kind = head["op"][0]
+    number = head.get_uint32("conn") if kind in (_MESSAGE, _CONNECTION) else 0
+    if kind == _MESSAGE and (topic := topics[number]) is not None:
+        topic.data.append(data)
+        topic.logged.append(head.get_time("time"))
+    elif kind == _CONNECTION and number not in topics:
+        about = Header.read(io.BytesIO(len(data).to_bytes(4, "little") + data))
+        name = about.get_string("type").replace("/", "/msg/")
+        fields = definitions(about.get_string("message_definition"), name, ros1=True)
+        topics[number] = series.topic(head.get_string("topic"), name, fields, ros1=True)
 
 
 def _ros2(series: Series) -> Iterator[None]:

@@ -11,10 +11,10 @@ from typing import Any
 from picchio.campaign.importing.isolated import Limits
 from picchio.campaign.importing.raw import RawFile
 from picchio.campaign.importing.readers.ros_messages import Series, Topic, collected, definitions
-from picchio.core.errors import InputError, warn_user
+from picchio.core.errors import warn_user
 
 LIMITS = Limits(seconds_a_byte=1e-5, memory_a_byte=32.0)  # often compressed
-_WORDS = "MCAP file"
+_WHAT = ("MCAP file", "mcap and rosbags")
 _SCHEMA, _CHANNEL, _MESSAGE = 3, 4, 5
 _HEAD = struct.Struct("<BQ")  # kind and length of a record
 _ABOUT = struct.Struct("<HIQQ")  # of a message: channel, number, when logged, when published
@@ -32,7 +32,7 @@ def read(path: Path, clock: Mapping[str, Any]) -> RawFile:
     Raises:
         InputError: mcap is missing, the file is no MCAP, or holds no number.
     """
-    return next(collected(Series(path, "mcap", clock), _fill, _WORDS, whole=True))
+    return next(collected(Series(path, "mcap", clock), _fill, _WHAT, whole=True))
 
 
 def blocks(path: Path, clock: Mapping[str, Any], names: set[str] | None) -> Iterator[RawFile]:
@@ -46,40 +46,28 @@ def blocks(path: Path, clock: Mapping[str, Any], names: set[str] | None) -> Iter
     Raises:
         InputError: as `read`.
     """
-    return collected(Series(path, "mcap", clock, names), _fill, _WORDS, whole=False)
+    return collected(Series(path, "mcap", clock, names), _fill, _WHAT, whole=False)
 
 
 def _fill(series: Series) -> Iterator[None]:
-    """A chunk at a time."""
-    try:
-        import rosbags.typesys  # noqa: F401
-        from mcap.exceptions import EndOfFile
-        from mcap.records import Channel, Chunk, Message, Schema
-        from mcap.stream_reader import ReadDataStream, StreamReader, get_chunk_data_stream
-    except ImportError:
-        raise InputError("MCAP files need mcap and rosbags", file=series.path,
-                         hint="pip install 'picchio[import]'") from None  # fmt: skip
+    """A chunk at a time; its messages, of which there are very many, by hand."""
+    from mcap.exceptions import EndOfFile
+    from mcap.records import Channel, Chunk, Message, Schema
+    from mcap.stream_reader import ReadDataStream, StreamReader, get_chunk_data_stream
+
     schemas: dict[int, Any] = {}
     topics: dict[int, Topic | None] = {}
 
-    def about(record: Any) -> None:
+    def take(record: Any) -> None:
         if isinstance(record, Schema):
             schemas[record.id] = record
         elif isinstance(record, Channel) and record.id not in topics:
-            schema, topics[record.id] = schemas.get(record.schema_id), None
-            if record.message_encoding == "json":
-                topics[record.id] = series.json_topic(record.topic)
-                return
-            if schema is None or (schema.encoding, record.message_encoding) not in _WRITTEN:
-                warn_user(f"{series.path}: messages of {record.topic} are not ROS's and left out")
-                return
-            ros1, idl = schema.encoding == "ros1msg", schema.encoding == "ros2idl"
-            kind = schema.name if schema.name.count("/") > 1 else schema.name.replace("/", "/msg/")
-            fields = definitions(schema.data.decode(), kind, ros1, idl)
-            topics[record.id] = series.topic(record.topic, kind, fields, ros1)
+            topics[record.id] = _topic(series, record, schemas.get(record.schema_id))
+        elif isinstance(record, Message) and (topic := topics[record.channel_id]) is not None:
+            topic.data.append(record.data)
+            topic.logged.append(record.log_time)
 
     def inside(data: bytes) -> None:
-        """The records of a chunk; its messages, of which there are very many, by hand."""
         at, end = 0, len(data)
         while at < end:
             kind, length = _HEAD.unpack_from(data, at)
@@ -94,7 +82,7 @@ def _fill(series: Series) -> Iterator[None]:
                     topic.logged.append(logged)
             elif kind in (_CHANNEL, _SCHEMA):
                 stream = ReadDataStream(io.BytesIO(data[at : at + length]))
-                about((Channel if kind == _CHANNEL else Schema).read(stream))
+                take((Channel if kind == _CHANNEL else Schema).read(stream))
             at += length
 
     with open(series.path, "rb") as file:
@@ -112,10 +100,19 @@ def _fill(series: Series) -> Iterator[None]:
             if isinstance(record, Chunk):
                 stream, length = get_chunk_data_stream(record, validate_crc=True)
                 inside(stream.read(length))
-            elif isinstance(record, Message):
-                if (topic := topics[record.channel_id]) is not None:
-                    topic.data.append(record.data)
-                    topic.logged.append(record.log_time)
             else:
-                about(record)
+                take(record)
             yield
+
+
+def _topic(series: Series, channel: Any, schema: Any) -> Topic | None:
+    """A channel's messages; None, with a warning, of what nobody can read."""
+    if channel.message_encoding == "json":
+        return series.json_topic(channel.topic)
+    if schema is None or (schema.encoding, channel.message_encoding) not in _WRITTEN:
+        warn_user(f"{series.path}: messages of {channel.topic} are not ROS's and left out")
+        return None
+    ros1, idl = schema.encoding == "ros1msg", schema.encoding == "ros2idl"
+    kind = schema.name if schema.name.count("/") > 1 else schema.name.replace("/", "/msg/")
+    fields = definitions(schema.data.decode(), kind, ros1, idl)
+    return series.topic(channel.topic, kind, fields, ros1)

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from picchio.campaign.importing.isolated import Limits
-from picchio.campaign.importing.raw import RawFile, below, columns_of, reason
+from picchio.campaign.importing.raw import RawFile, below, columns_of
+from picchio.campaign.source import library
 from picchio.core.errors import InputError
 
 LIMITS = Limits(memory_a_byte=64.0)
@@ -40,14 +41,11 @@ def blocks(path: Path, size: int) -> Iterator[RawFile]:
     Raises:
         InputError: as `read`.
     """
-    try:
+    with library("Parquet file", "pyarrow", path, extra="parquet"):
         import pyarrow
         import pyarrow.parquet
-    except ImportError:
-        raise InputError("Parquet files need pyarrow", hint="pip install 'picchio[parquet]'") from (
-            None
-        )
-    try:
+
+        kinds: dict[str, str] = {}
         # Nothing is read ahead: a column of a large row group would be held whole.
         with pyarrow.parquet.ParquetFile(path, pre_buffer=False, buffer_size=_BUFFER) as file:
             for group in range(file.num_row_groups):
@@ -57,6 +55,6 @@ def blocks(path: Path, size: int) -> Iterator[RawFile]:
                         if pyarrow.types.is_timestamp(about.type):  # without its zone: UTC
                             cells = cells.cast(pyarrow.timestamp("ns"))
                         columns[about.name] = cells.to_pandas().to_numpy()
-                    yield RawFile.of(path, "parquet", columns_of("", columns, table=True))
-    except (pyarrow.ArrowException, OSError, ValueError) as error:
-        raise InputError(f"is not a readable Parquet file: {reason(error)}", file=path) from None
+                    yield RawFile.of(
+                        path, "parquet", columns_of("", columns, table=True, kinds=kinds)
+                    )

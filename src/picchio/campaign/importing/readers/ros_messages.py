@@ -17,10 +17,12 @@ from typing import Any
 
 import numpy as np
 
-from picchio.campaign.importing.raw import RawChannel, RawFile, reason
+from picchio.campaign.importing.raw import RawChannel, RawFile
 from picchio.campaign.importing.readers.read_json_lines import by_key
+from picchio.campaign.source import library
 from picchio.core.arrays import FloatArray, IndexArray
 from picchio.core.errors import InputError, warn_user
+from picchio.core.tables import Column
 
 Fields = Mapping[str, Any]
 """Of each kind of message, as rosbags has them: (constants, [(field, how it is written)])."""
@@ -259,26 +261,28 @@ class JsonTopic(Topic):
 
     def numbers(self, log: bool, wanted: set[str] | None) -> Iterator[Numbers]:
         """As `Topic`."""
-        found = by_key([json.loads(data) for data in self.data])
+        found: dict[str, Column] = {}
+        for one in by_key([json.loads(data) for data in self.data]):
+            if isinstance(one, Column):
+                found[one.name] = one
+            elif one.text:
+                warn_user(f"{self.name}: {one.told}")
         stamps = np.array(self.logged, dtype=np.int64)
         for head in () if log else _STAMPS:
-            names = [f"{head}.{rest}" for rest in ("sec", "nsec", "nanosec")]
-            parts = [found.get(name, ((), ()))[1] for name in names]
-            if len(parts[0]) == len(self.data) == len(parts[1] or parts[2]):
-                seconds, rest = (np.array(p, np.int64) for p in (parts[0], parts[1] or parts[2]))
-                stamps = seconds * _NANO + rest
+            seconds, *rest = (found.get(f"{head}.{part}") for part in ("sec", "nsec", "nanosec"))
+            whole = [c.values for c in (seconds, rest[0] or rest[1]) if c and c.kind == "number"]
+            if len(whole) == 2 and not any(np.isnan(values).any() for values in whole):
+                stamps = whole[0].astype(np.int64) * _NANO + whole[1].astype(np.int64)
                 break
-        for name, (at, values) in found.items():
+        for name, column in found.items():
             own = f"{self.name}:{name}"
             if name.startswith((*_STAMPS, "header.")) or not (wanted is None or own in wanted):
                 continue
-            if name.endswith(f"[{_LONGEST}]") or not all(
-                isinstance(v, (bool, int, float)) for v in values
-            ):
-                warn_user(f"{own}: left out: {len(values)} values, the first {values[0]!r:.60}")
+            if name.endswith(f"[{_LONGEST}]") or column.kind != "number":
+                first = str(column.values[0])[:60]
+                warn_user(f"{own}: left out: {len(column.values)} values, the first {first!r}")
                 continue
-            there = stamps if len(at) == stamps.size else stamps[at]
-            yield own, (None, None), there, np.array(values, np.float64)
+            yield own, (None, None), stamps, column.values.astype(np.float64)
         self.data, self.logged = [], []
 
 
@@ -382,21 +386,21 @@ class Series:
 
 
 def collected(
-    series: Series, fill: Callable[[Series], Iterator[None]], words: str, *, whole: bool
+    series: Series, fill: Callable[[Series], Iterator[None]], what: tuple[str, str], *, whole: bool
 ) -> Iterator[RawFile]:
     """The numbers of a log: whole, or in blocks of so many messages that memory does not grow.
 
     Args:
         series: to collect them.
         fill: gives the log's messages to topics of the series, and stops now and then.
-        words: what kind of file it is, for people.
+        what: kind of file it is, for people, and the libraries that read it.
         whole: whether one block is wanted.
 
     Raises:
         InputError: the file is none of its kind, or damaged; no message held a number.
     """
     found = 0
-    try:
+    with library(*what, series.path):
         for _ in fill(series):
             if series.full and whole:
                 series.settle()
@@ -404,10 +408,6 @@ def collected(
                 found += 1
                 yield block
         last = series.block()
-    except (MemoryError, InputError):
-        raise
-    except Exception as error:  # the readers' and decompressors' own kinds, and what damage makes
-        raise InputError(f"is not a readable {words}: {reason(error)}", file=series.path) from None
     if last is not None:
         yield last
     elif not found and series.wanted is None:
