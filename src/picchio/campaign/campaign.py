@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from picchio.campaign.channels import parse_channel
 from picchio.campaign.clock import TOLERANCE
-from picchio.campaign.csv_source import text_source, write_csv
+from picchio.campaign.csv_source import TextSource, write_csv
 from picchio.campaign.parquet_source import ParquetSource, write_parquet
 from picchio.campaign.record import LAYOUTS, Record
 from picchio.campaign.source import Source
@@ -235,51 +235,49 @@ class Campaign(Shown):
             _check_record(record, key, file)
 
 
+_WORDS = {"frf": "frequency response function"}
+_NEEDED = {
+    "percussion": ("pose", "direction"),
+    "clamped": ("pose",),
+    "frf": ("pose", "force_direction", "response_direction"),
+}
+
+
 def _check_record(record: Record, key: str, file: Path | None) -> None:
-    if record.kind != "static" and record.table.joint_map is not None:
-        raise InputError(f"only a static record may have it; {record.file} is one of "
-                         f"{record.kind}", file=file, key=f"{key}.joint_map")  # fmt: skip
-    of_frf = record.table.frf_keys()
-    if record.kind != "frf" and of_frf:
-        raise InputError(f"only a frequency response function may have it; {record.file} is one of "
-                         f"{record.kind}", file=file, key=f"{key}.{of_frf[0]}")  # fmt: skip
-    if record.kind != "frf" and Path(record.file).suffix in UFF_SUFFIXES:
+    kind, table, name = record.kind, record.table, record.file
+    joint_map = ["joint_map"] if table.joint_map is not None else []
+    for only, found in (("static", joint_map), ("frf", table.frf_keys())):
+        if kind != only and found:
+            words = _WORDS.get(only, f"{only} record")
+            raise InputError(f"only a {words} may have it; {name} is one of {kind}", file=file,
+                             key=f"{key}.{found[0]}")  # fmt: skip
+    if kind != "frf" and Path(name).suffix in UFF_SUFFIXES:
         raise InputError("only frequency response functions are read from UFF files as they are",
-                         file=file, key=f"{key}.file", value=record.file,
+                         file=file, key=f"{key}.file", value=name,
                          hint="`picchio import` makes a campaign of time histories")  # fmt: skip
-    if record.kind == "frf":
-        for name in ("pose", "force_direction", "response_direction"):
-            if getattr(record.table, name) is None:
-                raise InputError(f"a frequency response function ({record.file}) needs this key",
-                                 file=file, key=f"{key}.{name}")  # fmt: skip
-        if missing := [name for name in ("real", "imag") if name not in record.channels]:
+    for needed in _NEEDED.get(kind, ()):
+        if getattr(table, needed) is None:
+            words = _WORDS.get(kind, f"{kind} record")
+            raise InputError(f"a {words} ({name}) needs this key", file=file,
+                             key=f"{key}.{needed}")  # fmt: skip
+    if kind == "frf":
+        if missing := [part for part in ("real", "imag") if part not in record.channels]:
             raise record.source.error("has no such column", channel=missing[0])
-        wanted = f"{ORDINATE[record.table.quantity or 'accelerance'][1]}/N"
-        units = [record.channel(name).unit for name in ("real", "imag")]
+        wanted = f"{ORDINATE[table.quantity or 'accelerance'][1]}/N"
+        units = [record.channel(part).unit for part in ("real", "imag")]
         if units[0] != units[1] or units[0] not in ("1", wanted):
             raise record.source.error("both parts must be in the unit of the record's quantity",
                                       channel="real, imag", value=" and ".join(units),
                                       choices=[f"a multiple of {wanted}"])  # fmt: skip
-    if record.kind == "clamped":
-        if record.pose is None:
-            raise InputError(f"a clamped record ({record.file}) needs this key",
-                             file=file, key=f"{key}.pose")  # fmt: skip
-        if not any(record.channel(name).kind.name == "torque" for name in record.channels):
-            raise record.source.error("has no column torque.<joint>, of no motor that presses")
-    if record.kind != "percussion":
-        if useless := record.table.percussion_keys():
-            text = f"{file}: {key} ({record.file}): a {record.kind} record has no use for "
-            warn_user(text + ", ".join(useless))
-        return
-    for name in ("pose", "direction"):
-        if getattr(record.table, name) is None:
-            raise InputError(f"a percussion record ({record.file}) needs this key",
-                             file=file, key=f"{key}.{name}")  # fmt: skip
-    if record.blows() is None and "force" not in record.channels:
-        raise InputError(
-            f"{record.file} has no measured force, and [excitation] does not state the blows",
-            file=file, key=key,
-        )  # fmt: skip
+    pressed = any(record.channel(one).kind.name == "torque" for one in record.channels)
+    if kind == "clamped" and not pressed:
+        raise record.source.error("has no column torque.<joint>, of no motor that presses")
+    if kind != "percussion" and (useless := table.percussion_keys()):
+        text = f"{file}: {key} ({name}): a {kind} record has no use for "
+        warn_user(text + ", ".join(useless))
+    if kind == "percussion" and record.blows() is None and "force" not in record.channels:
+        raise InputError(f"{name} has no measured force, and [excitation] does not state the blows",
+                         file=file, key=key)  # fmt: skip
 
 
 def load_campaign(path: str | Path | Campaign, *, clock_tolerance: float = TOLERANCE) -> Campaign:
@@ -328,7 +326,7 @@ def _open(folder: Path, entry: RecordTable, index: int) -> Source:
         raise InputError("is outside the campaign's folder", file=path, key=f"{key}.file")
     if path.suffix in UFF_SUFFIXES and entry.kind == "frf":
         return frf_source(path, key, LAYOUTS["frf"], entry)
-    kind = ParquetSource if path.suffix == ".parquet" else text_source
+    kind = ParquetSource if path.suffix == ".parquet" else TextSource
     return kind(path, key, LAYOUTS.get(entry.kind))
 
 
