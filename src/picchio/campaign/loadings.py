@@ -72,18 +72,7 @@ def read_loadings(record: Record) -> Loadings:
             a joint of `joint_map` whose columns are not there; a dial or pull without direction.
     """
     columns = record.read()
-    if len(next(iter(columns.values()))) == 0:
-        raise record.source.error("holds no loading")
-
-    def vectors(name: str) -> FloatArray | None:
-        """(m, 3); axes that are left out are zero."""
-        given = [columns.get(f"{name}.{axis}") for axis in AXES]
-        size = next((len(one) for one in given if one is not None), None)
-        if size is None:
-            return None
-        return np.stack([np.zeros(size) if one is None else one for one in given], axis=1)
-
-    force, weight, pull = vectors("force"), columns.get("weight"), columns.get("pull")
+    force, weight, pull = _vectors(columns, "force"), columns.get("weight"), columns.get("pull")
     count = sum(one is not None for one in (force, weight, pull))
     if count != 1:
         raise record.source.error(
@@ -94,7 +83,7 @@ def read_loadings(record: Record) -> Loadings:
     if pull is not None:
         force = pull[:, None] * _ways(record, columns, "pull_direction", "which way does it pull?")
     return Loadings(
-        record.file, _poses(record, columns), force, weight, vectors("point"),
+        record.file, _poses(record, columns), force, weight, _vectors(columns, "point"),
         _readings(record, columns), columns.get("set"),
     )  # fmt: skip
 
@@ -131,53 +120,45 @@ def _poses(record: Record, columns: Mapping[str, FloatArray]) -> dict[str, Float
 
 
 def _readings(record: Record, columns: Mapping[str, FloatArray]) -> tuple[Reading, ...]:
-    size = len(next(iter(columns.values())))
+    frames: dict[str, list[str]] = {}
     found: dict[str, Reading] = {}
     for name, channel in record.source.channels.items():
-        values = columns[name]
-        if channel.kind.name == "displacement":
-            frame = channel.subject
-            axis = np.tile(np.eye(3)[AXES.index(channel.axis or "x")], (size, 1))[:, None]
-            before = found.get(f"displacement.{frame}")
-            if before is not None and before.axes is not None:
-                values = np.column_stack([before.values, values])
-                axis = np.concatenate([before.axes, axis], axis=1)
-            else:
-                values = values[:, None]
-            found[f"displacement.{frame}"] = Reading(
-                f"displacement.{frame}", values, axis, frame=frame
-            )
-        elif channel.kind.name == "deflection":
-            found[name] = Reading(name, values[:, None], joint=channel.subject)
-        elif channel.kind.name == "dial":
-            found[name] = _dial(record, columns)
+        kind, subject = channel.kind.name, channel.subject or ""
+        if kind == "displacement":
+            frames.setdefault(subject, []).append(name)
+            along = np.eye(3)[[AXES.index(one[-1]) for one in frames[subject]]]
+            values = np.column_stack([columns[one] for one in frames[subject]])
+            axes = np.broadcast_to(along, (*values.shape, 3))
+            of_frame = f"displacement.{subject}"
+            found[of_frame] = Reading(of_frame, values, axes, frame=subject)
+        elif kind == "deflection":
+            found[name] = Reading(name, columns[name][:, None], joint=subject)
+        elif kind == "dial":
+            way = _ways(record, columns, "dial_direction", "which way does the dial read?")
+            point = _vectors(columns, "dial_point")
+            found[name] = Reading(name, columns[name][:, None], way[:, None], point=point)
     if not found:
         hint = "give columns displacement.<frame>.x [m], dial [m] or deflection.<joint> [rad]"
         raise record.source.error("tells nothing that moved", hint=hint)
     return tuple(found.values())
 
 
-def _dial(record: Record, columns: Mapping[str, FloatArray]) -> Reading:
-    size = len(columns["dial"])
-    way = _ways(record, columns, "dial_direction", "which way does the dial read?")
-
-    def column(name: str, axis: str) -> FloatArray:
-        return columns.get(f"{name}.{axis}", np.zeros(size))
-
-    point = None
-    if any(f"dial_point.{axis}" in columns for axis in AXES):
-        point = np.stack([column("dial_point", axis) for axis in AXES], axis=1)
-    return Reading("dial", columns["dial"][:, None], way[:, None], point=point)
+def _vectors(columns: Mapping[str, FloatArray], name: str) -> FloatArray | None:
+    """(m, 3) of three columns; axes that are left out are zero; None where all are."""
+    given = [columns.get(f"{name}.{axis}") for axis in AXES]
+    zero = np.zeros(len(next(iter(columns.values()))))
+    if all(one is None for one in given):
+        return None
+    return np.stack([zero if one is None else one for one in given], axis=1)
 
 
 def _ways(
     record: Record, columns: Mapping[str, FloatArray], name: str, question: str
 ) -> FloatArray:
     """(m, 3) of unit length; axes that are left out are zero."""
-    size = len(next(iter(columns.values())))
-    way = np.stack([columns.get(f"{name}.{axis}", np.zeros(size)) for axis in AXES], axis=1)
-    length = np.linalg.norm(way, axis=1)
-    if not (length > 0.0).all():
+    way = _vectors(columns, name)
+    length = np.zeros(1) if way is None else np.linalg.norm(way, axis=1)
+    if way is None or not (length > 0.0).all():
         bad = int(np.argmin(length > 0.0))
         raise record.source.error(f"is zero or missing: {question}", channel=name, sample=bad)
     return np.asarray(way / length[:, None])

@@ -20,7 +20,7 @@ from picchio.campaign.channels import (
     parse_channel,
 )
 from picchio.campaign.clock import TOLERANCE, Clock, ClockCheck
-from picchio.campaign.source import Layout, MemorySource, Source
+from picchio.campaign.source import Arrays, Layout, MemorySource, Source
 from picchio.campaign.tables import (
     CAMPAIGN_FILE,
     FORMAT,
@@ -92,8 +92,7 @@ class Record(Shown):
         Raises:
             InputError: an unknown channel or key, arrays that don't fit.
         """
-        found = [parse_channel(name, (units or {}).get(name))[0] for name in channels]
-        return cls(_table(file, table), MemorySource(found, {**channels, TIME: time}, file))
+        return cls._of(file, list(channels), {**channels, TIME: time}, units, table)
 
     @classmethod
     def from_columns(
@@ -116,14 +115,7 @@ class Record(Shown):
         Raises:
             InputError: an unknown column or key, arrays that don't fit.
         """
-        entry = _table(file, table)
-        layout = LAYOUTS.get(entry.kind, Layout())
-        found = [
-            parse_channel(name, (units or {}).get(name), layout.kinds)[0]
-            for name in columns
-            if name != layout.first
-        ]
-        return cls(entry, MemorySource(found, columns, file, layout))
+        return cls._of(file, list(columns), columns, units, table)
 
     @classmethod
     def from_function(
@@ -148,8 +140,26 @@ class Record(Shown):
         Raises:
             InputError: as `from_arrays`.
         """
-        found = [parse_channel(name, (units or {}).get(name))[0] for name in names]
-        return cls(_table(file, table), MemorySource(found, read, file))
+        return cls._of(file, names, read, units, table)
+
+    @classmethod
+    def _of(
+        cls,
+        file: str,
+        names: Sequence[str],
+        arrays: Arrays,
+        units: Mapping[str, str] | None,
+        table: Mapping[str, Any],
+    ) -> Record:
+        content = {"format": FORMAT, "record": [{"file": file, **table}]}
+        entry = validate(content, CampaignTable, format=FORMAT).record[0]
+        layout = LAYOUTS.get(entry.kind, Layout())
+        found = [
+            parse_channel(name, (units or {}).get(name), layout.kinds)[0]
+            for name in names
+            if name != layout.first
+        ]
+        return cls(entry, MemorySource(found, arrays, file, layout))
 
     def to_frame(self) -> pandas.DataFrame:
         """A row a sample: the time (or the first column) and every channel, SI."""
@@ -351,8 +361,13 @@ class Record(Shown):
 
         Args:
             channels: names; None for all.
+
+        Raises:
+            InputError: as `chunks`; there is no row.
         """
         blocks = list(self.chunks(channels))
+        if not blocks:
+            raise self.source.error("is empty")
         return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
 
     def __getitem__(self, name: str) -> FloatArray:
@@ -380,8 +395,3 @@ class Record(Shown):
         """
         for _ in self.chunks():
             pass
-
-
-def _table(file: str, table: Mapping[str, Any]) -> RecordTable:
-    content = {"format": FORMAT, "record": [{"file": file, **table}]}
-    return validate(content, CampaignTable, format=FORMAT).record[0]
