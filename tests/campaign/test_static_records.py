@@ -171,3 +171,12 @@ def test_who_has_no_use_for_them_says_so(tmp_path):
     for does in (picchio.check, lambda c: picchio.diagnose("fanuc_like_3dof", c)):
         with pytest.raises(picchio.InputError, match="no use for static records"):
             does(tmp_path)
+
+
+def test_a_table_without_a_row_is_refused(tmp_path):
+    (tmp_path / "loads.csv").write_text("weight [N],dial [m],dial_direction.z\n")
+    (tmp_path / "campaign.toml").write_text(
+        'format = "picchio-campaign/1"\n[[record]]\nfile = "loads.csv"\nkind = "static"\n'
+    )
+    with pytest.raises(picchio.InputError, match=r"loads\.csv.*is empty"):
+        load_campaign(tmp_path).records[0].read()

@@ -223,12 +223,11 @@ class MemorySource(Source):
         arrays: {name: (m,) SI}, the time among them; or a function that returns it.
         key: the record's name in messages.
         layout: what its columns may be.
+        path: the file that they are of, if there is one.
 
     Raises:
         InputError: arrays of several lengths, a channel without array, fewer than two samples.
     """
-
-    path = None
 
     def __init__(
         self,
@@ -236,8 +235,9 @@ class MemorySource(Source):
         arrays: Arrays,
         key: str = "record",
         layout: Layout | None = None,
+        path: Path | None = None,
     ) -> None:
-        self.key = key
+        self.path, self.key = path, key
         self.layout = layout or Layout()
         self.channels = {channel.name: channel for channel in channels}
         self._arrays: dict[str, FloatArray] | None = None

@@ -59,18 +59,6 @@ def place(data: Mapping[str, Any], of: str) -> str:
     return f"{int(data.get(f'{of}_node', 0) or 0)}{direction}"
 
 
-class _FrfSource(MemorySource):
-    """One function of a universal file, read when it is first needed."""
-
-    def __init__(self, path: Path, key: str, layout: Layout, entry: RecordTable) -> None:
-        names = ["real", "imag", "coherence"]
-        found = _function(path, key, entry)
-        names = [name for name in names if name in found]
-        channels = [parse_channel(name, None, layout.kinds)[0] for name in names]
-        super().__init__(channels, found, key, layout)
-        self.path: Path = path  # type: ignore[assignment]
-
-
 def frf_source(path: Path, key: str, layout: Layout, entry: RecordTable) -> MemorySource:
     """A frequency response function of a universal file (data set 58, function type 4).
 
@@ -87,7 +75,10 @@ def frf_source(path: Path, key: str, layout: Layout, entry: RecordTable) -> Memo
     """
     if not path.is_file():
         raise InputError("no such file", file=path, key=key)
-    return _FrfSource(path, key, layout, entry)
+    found = _function(path, key, entry)
+    names = [name for name in ("real", "imag", "coherence") if name in found]
+    channels = [parse_channel(name, None, layout.kinds)[0] for name in names]
+    return MemorySource(channels, found, key, layout, path)
 
 
 def _function(path: Path, key: str, entry: RecordTable) -> dict[str, FloatArray]:

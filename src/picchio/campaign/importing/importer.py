@@ -15,10 +15,10 @@ from picchio.campaign.channels import TIME, parse_channel
 from picchio.campaign.importing.detect import implausible, rising, told
 from picchio.campaign.importing.isolated import blocks_isolated, read_isolated
 from picchio.campaign.importing.mapping import (
+    UNSAID,
     ChannelTable,
     JoinTable,
     Mapping,
-    TimeTable,
     read_mapping,
 )
 from picchio.campaign.importing.raw import RawChannel, RawFile, below
@@ -31,18 +31,13 @@ from picchio.core.errors import InputError, warn_user
 from picchio.core.files import locked, regular_file
 from picchio.core.provenance import provenance
 from picchio.core.results import Result
-from picchio.core.tables import TextLayout, read_table, table_blocks
+from picchio.core.tables import read_table, table_blocks
 from picchio.core.toml import read_toml
 
 if TYPE_CHECKING:
     import pandas
 
-_ROOM = "picchio.campaign.importing.readers"
-_ISOLATED = {
-    "uff": "read_uff", "mcap": "read_mcap", "matlab": "read_matlab", "bag": "read_bag",
-    "parquet": "read_parquet", "npz": "read_npz", "json-lines": "read_json_lines",
-    "lvm": "read_lvm",
-}  # fmt: skip
+_READER = "picchio.campaign.importing.readers.read_"
 _IN_BLOCKS = ("csv", "parquet", "mcap", "bag")
 ENDINGS = {".csv": "csv", ".txt": "csv", ".tsv": "csv", ".dat": "csv", ".uff": "uff",
             ".unv": "uff", ".mcap": "mcap", ".mat": "matlab", ".parquet": "parquet",
@@ -56,7 +51,7 @@ _PATIENCE = 60.0
 _BLOCK = 1 << 17  # samples
 
 
-def kind_of(path: Path, mapping: Mapping | None = None) -> str:
+def kind_of(path: Path, mapping: Mapping = UNSAID) -> str:
     """The kind of a foreign file, as the mapping or its ending says.
 
     Args:
@@ -69,7 +64,7 @@ def kind_of(path: Path, mapping: Mapping | None = None) -> str:
     first = parts_of(path)[0]
     if tool := _PACKED.get(first.suffix.lower()):
         raise InputError("is packed", file=path, hint=f"unpack it: {tool} {first}")
-    kind = (mapping.source.kind if mapping else None) or ENDINGS.get(first.suffix.lower())
+    kind = mapping.source.kind or ENDINGS.get(first.suffix.lower())
     if kind is None:
         raise InputError("the kind of file is not known by its ending", file=path,
                          value=path.suffix, choices=ENDINGS,
@@ -94,7 +89,7 @@ def parts_of(path: Path) -> list[Path]:
     return sorted(found, key=lambda p: (len(p.name), p.name))
 
 
-def read_raw(path: str | Path, mapping: Mapping | None = None) -> RawFile:
+def read_raw(path: str | Path, mapping: Mapping = UNSAID) -> RawFile:
     """The series of a foreign file.
 
     Args:
@@ -109,12 +104,17 @@ def read_raw(path: str | Path, mapping: Mapping | None = None) -> RawFile:
     """
     source = Path(path)
     kind, files = kind_of(source, mapping), parts_of(source)
-    clock = mapping.time.model_dump(mode="json") if mapping else {}
+    clock = mapping.time.model_dump(mode="json")
     if kind == "csv":
-        raw = RawFile.of_table(read_table(files[0], _layout(mapping)))
+        raw = RawFile.of_table(read_table(files[0], mapping.source.layout))
     else:
-        raw = _one_log([read_isolated(f"{_ROOM}.{_ISOLATED[kind]}", f, clock) for f in files])
-    return told_apart(_rows(raw, mapping) if mapping else raw, _time(mapping))
+        raw = _one_log([read_isolated(_reader(kind), f, clock) for f in files])
+    return told_apart(_rows(raw, mapping), mapping.time)
+
+
+def _reader(kind: str) -> str:
+    """The module that reads such files, in a process of its own."""
+    return _READER + kind.replace("-", "_")
 
 
 def _one_log(parts: list[RawFile]) -> RawFile:
@@ -130,17 +130,6 @@ def _one_log(parts: list[RawFile]) -> RawFile:
             channels[name] = replace(c, time=np.append(before.time, c.time + late),
                                      values=np.append(before.values, c.values))  # fmt: skip
     return replace(first, channels=channels or first.channels)
-
-
-def _layout(mapping: Mapping | None) -> TextLayout | None:
-    """How a table is written, where the mapping says so."""
-    if mapping is None or not mapping.source.stated:
-        return None
-    return mapping.source
-
-
-def _time(mapping: Mapping | None) -> TimeTable:
-    return mapping.time if mapping else TimeTable()
 
 
 def read_blocks(
@@ -159,31 +148,32 @@ def read_blocks(
     Raises:
         InputError: as `read_raw`.
     """
+    mapping = mapping or UNSAID
     kind, files = kind_of(path, mapping), parts_of(path)
     if kind not in _IN_BLOCKS:
         yield read_raw(path, mapping)
     elif kind == "csv":
-        tables = table_blocks(files[0], _layout(mapping), size)
+        tables = table_blocks(files[0], mapping.source.layout, size)
         yield from _tables(map(RawFile.of_table, tables), mapping, size)
     elif kind == "parquet":
         yield from _tables(read_parquet.blocks(path, size), mapping, size)
     else:
-        clock = mapping.time.model_dump(mode="json") if mapping else {}
+        clock = mapping.time.model_dump(mode="json")
         for file in files:
-            yield from blocks_isolated(f"{_ROOM}.{_ISOLATED[kind]}", file, clock, names)
+            yield from blocks_isolated(_reader(kind), file, clock, names)
 
 
-def _tables(blocks: Iterator[RawFile], mapping: Mapping | None, size: int) -> Iterator[RawFile]:
+def _tables(blocks: Iterator[RawFile], mapping: Mapping, size: int) -> Iterator[RawFile]:
     """Blocks of a table, of the rows that pass; of more than one row each, where there are two."""
     before, held = 0, None
     for raw in blocks:
-        new = raw if mapping is None else _rows(raw, mapping)
+        new = _rows(raw, mapping)
         if held is not None and min(held.rows, new.rows) > 1 and held.rows + new.rows > size:
-            yield told_apart(replace(held, before=before), _time(mapping))
+            yield told_apart(replace(held, before=before), mapping.time)
             before, held = before + held.rows, None
         held = new if held is None else below([held, new])
     if held is not None:
-        yield told_apart(replace(held, before=before), _time(mapping))
+        yield told_apart(replace(held, before=before), mapping.time)
 
 
 def _rows(raw: RawFile, mapping: Mapping) -> RawFile:
@@ -192,10 +182,9 @@ def _rows(raw: RawFile, mapping: Mapping) -> RawFile:
     Several runs, one below the other, have a clock only each by itself.
     """
     filters = [entry for entry in mapping.filter if entry.series in raw.channels]
-    sizes = {channel.values.size for channel in raw.channels.values()}
-    if not filters or len(sizes) > 1 or any(c.time is not None for c in raw.channels.values()):
+    if not filters or not raw.rows or any(c.time is not None for c in raw.channels.values()):
         return raw
-    held = np.ones(sizes.pop(), bool)
+    held = np.ones(raw.rows, bool)
     for entry in filters:
         held &= entry.passes(raw.channels[entry.series].values)
     return raw.at(held)
@@ -242,7 +231,7 @@ class Detection(Result):
         }  # fmt: skip
 
 
-def detection(path: str | Path, mapping: Mapping | None = None) -> Detection:
+def detection(path: str | Path, mapping: Mapping = UNSAID) -> Detection:
     """What a file seems to be: its layout, series, clock, rate and gaps.
 
     Args:
@@ -255,7 +244,7 @@ def detection(path: str | Path, mapping: Mapping | None = None) -> Detection:
     raw = read_raw(path, mapping)
     clocks: dict[bytes, str] = {}
     try:
-        raw = clocked(raw, _time(mapping))
+        raw = clocked(raw, mapping.time)
         lines = list(raw.told)
         for channel in raw.channels.values():
             if channel.time is not None and channel.time.size > 1:
@@ -397,22 +386,15 @@ def _read_mapped(
     name = file or f"{Path(path).stem}.csv"
     stem, _, ending = name.rpartition(".")
     records = []
-    for count, (time, values) in enumerate(pieces, start=1):
-        own = name if count == 1 else f"{stem}-{count}.{ending}"
-        channels, units = _channels(mapping, raw, dict(zip(used, values, strict=True)), time,
-                                    mapping_file)  # fmt: skip
-        try:
-            records.append(Record.from_arrays(own, time, channels, units=units, **table))
-        except InputError as error:
-            if error.file is not None:
-                raise
-            raise InputError(str(error), file=mapping_file or path) from None
     try:
+        for count, (time, values) in enumerate(pieces, start=1):
+            own = name if count == 1 else f"{stem}-{count}.{ending}"
+            stored = dict(zip(used, values, strict=True))
+            channels, units = _channels(mapping, raw, stored, time, mapping_file)
+            records.append(Record.from_arrays(own, time, channels, units=units, **table))
         campaign = Campaign.from_records(records, **mapping.campaign)
     except InputError as error:
-        if error.file is not None:
-            raise
-        raise InputError(str(error), file=mapping_file or path) from None
+        raise error if error.file else error.placed(file=mapping_file or path) from None
     for record in records:
         record.check_samples()
     lines = raw.told

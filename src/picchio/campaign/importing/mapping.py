@@ -33,9 +33,9 @@ class SourceTable(TextLayout):
     kind: FileKind | None = None
 
     @property
-    def stated(self) -> bool:
-        """Whether the mapping says how a table is written."""
-        return bool(self.model_fields_set - {"kind", "encoding"})
+    def layout(self) -> TextLayout | None:
+        """How a table is written; None where the mapping does not say it."""
+        return self if self.model_fields_set - {"kind", "encoding"} else None
 
 
 def _gaps(value: str) -> str:
@@ -256,6 +256,10 @@ class Mapping(StrictModel):
                 )  # fmt: skip
                 found.append((f"coupling[{i}].from", parts or {table.series[0]: 0.0}, entry))
         return [(key, entry.to, parts, entry) for key, parts, entry in found]
+
+
+UNSAID = Mapping.model_construct()
+"""What holds of a file of which nothing is known."""
 
 
 def read_mapping(path: str | Path) -> Mapping:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -109,6 +109,8 @@ def accelerometers(raw: RawFile) -> list[Accelerometer]:
     for channel in raw.channels.values():
         if channel.clock or (time is not None and channel.name == time.series):
             continue
+        if not np.isfinite(channel.values).any():
+            continue
         name, unit = _parted(channel)
         parts = _AXIS.fullmatch(name)
         sensor, axis = (parts["sensor"], parts["axis"].lower()) if parts else (name, AXES[0])
@@ -117,28 +119,29 @@ def accelerometers(raw: RawFile) -> list[Accelerometer]:
     for (sensor, unit), axes in groups.items():
         series = {axis: channel.name for axis, channel in sorted(axes.items())}
         if unit is not None:
-            if (convert := _acceleration(unit)) is not None:
+            if (convert := _converting(unit)) is not None:
                 found.append(Accelerometer(series, unit, f"in {unit}, as the file says", convert))
             continue
         rest = float(np.linalg.norm([np.nanmedian(channel.values) for channel in axes.values()]))
-        told = [u for u in ("g", "m/s^2", "mg") if _is_gravity(rest, _acceleration(u))]
+        told = [u for u in ("g", "m/s^2", "mg") if _is_gravity(rest, _converting(u))]
         if told and len(axes) == len(AXES):
             why = f"at rest the three read {rest:.2f} in all, which is gravity in {told[0]}"
-            found.append(Accelerometer(series, told[0], why, _acceleration(told[0])))
+            found.append(Accelerometer(series, told[0], why, _converting(told[0])))
         elif len(axes) == len(AXES) and (not sensor or _ACCELERATION.fullmatch(sensor)):
             found.append(Accelerometer(series, "", "as the names say; no unit is told", None))
     return sorted(found, key=lambda one: -len(one.series))
 
 
-def _acceleration(unit: str) -> Conversion | None:
+def _converting(unit: str | None, to: Sequence[str] = ("m/s^2",)) -> Conversion | None:
+    """How readings of a unit become SI; None where it is no unit of such a channel."""
     try:
-        return conversion(unit, ("m/s^2",))[1]
+        return None if unit is None else conversion(unit, to)[1]
     except InputError:
         return None
 
 
 def _is_gravity(rest: float, convert: Conversion | None) -> bool:
-    wanted = _acceleration("g")
+    wanted = _converting("g")
     assert convert is not None and wanted is not None
     return abs(rest * convert.scale / wanted.scale - 1.0) < _AT_REST
 
@@ -212,7 +215,7 @@ def _one(
 ) -> Named:  # fmt: skip
     name, unit = _parted(channel)
     known = (*LOG_KINDS, *kinds())
-    if unit is not None and not _fits(unit, known):
+    if unit is not None and not any(_converting(unit, kind.units) for kind in known):
         return Named(channel.name, "", None, f"{unit!r} is no unit of a channel")
     wanted, why = name, "named as a channel"
     if joints is not None and name in joints:
@@ -249,22 +252,10 @@ def _parted(channel: RawChannel) -> tuple[str, str | None]:
     ).strip()
 
 
-def _fits(unit: str, known: Collection[ChannelKind]) -> bool:
-    return any(_of(unit, kind) for kind in known)
-
-
-def _of(unit: str, kind: ChannelKind) -> bool:
-    try:
-        conversion(unit, kind.units)
-    except InputError:
-        return False
-    return True
-
-
 def _reading(unit: str | None, known: Collection[ChannelKind]) -> str:
     """Which of a joint's readings is in this unit; its position where nothing is told."""
-    for kind in known if unit else ():
-        if kind.of == "joint" and kind.name in _OF_JOINTS and _of(unit or "", kind):
+    for kind in known:
+        if kind.of == "joint" and kind.name in _OF_JOINTS and _converting(unit, kind.units):
             return kind.name
     return _OF_JOINTS[0]
 
@@ -273,5 +264,5 @@ def _choices(unit: str | None, known: Collection[ChannelKind]) -> str:
     """The channels that have this unit, for people."""
     if unit is None:
         return ""
-    names = dict.fromkeys(kind.pattern for kind in known if _of(unit, kind))
+    names = dict.fromkeys(kind.pattern for kind in known if _converting(unit, kind.units))
     return f"in {unit}: " + ", ".join(names)
