@@ -55,7 +55,5 @@ def _show(found: DirectionEnvelope) -> None:
     out.print(f"  natural frequencies {frequencies} Hz\n")
     out.print(listed(found._listing(), "Estimated: P10 to P90" if found.estimated else ""))
     x, y, z = found.worst_tool_direction
-    out.print(
-        f"The tool moves most, {found.peak_tool_displacement * 1e3:.4g} mm, under a force along "
-        f"({x:.3f}, {y:.3f}, {z:.3f})."
-    )
+    most = spoken.number(1e3 * found.peak_tool_displacement)
+    out.print(f"The tool moves most, {most} mm, under a force along ({x:.3f}, {y:.3f}, {z:.3f}).")
