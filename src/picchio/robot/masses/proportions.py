@@ -15,6 +15,7 @@ from itertools import pairwise, product
 
 import numpy as np
 
+from picchio.core import spoken
 from picchio.robot.finding import Finding
 from picchio.robot.urdf.shapes import link_ends
 from picchio.robot.urdf.tree import MOVABLE, UrdfTree
@@ -57,7 +58,9 @@ class _Measure:
         return away if self.small else max(away, 0.0)
 
     def said(self, value: float) -> str:
-        return self.told.format(value, value / self.typical)
+        return self.told.format(
+            *(spoken.number(x, least=0.0) for x in (value, value / self.typical))
+        )
 
     def possible(self, value: float) -> bool:
         return self.least <= value <= self.most
@@ -65,25 +68,25 @@ class _Measure:
 
 _MEASURES = {
     "length": _Measure(
-        "{:.3g} m from joint to joint", 1.0, 0.35, {"lengths": 1}, 1e-3, 100.0,
+        "{} m from joint to joint", 1.0, 0.35, {"lengths": 1}, 1e-3, 100.0,
         "the longest arms, of space stations and concrete pumps, have 17 to 70 m"),
     "density": _Measure(
-        "links that weigh {1:.3g} times what arms of its length weigh", 15.0, 0.45,
+        "links that weigh {1} times what arms of its length weigh", 15.0, 0.45,
         {"lengths": -3, "masses": 1}, _AIR * _THICK, _STEEL * _THICK,
         "a rod of its length and half as thick weighs less of air, and more of steel"),
     "gyration": _Measure(
-        "links whose radius of gyration is {:.2g} times the way between their joints", 0.45, 0.25,
+        "links whose radius of gyration is {} times the way between their joints", 0.45, 0.25,
         {"inertias": 0.5, "masses": -0.5, "lengths": -1}),
     "centre": _Measure(
-        "a centre of mass {:.3g} times its length from its joint", 0.2, 0.35,
+        "a centre of mass {} times its length from its joint", 0.2, 0.35,
         {"centres of mass": 1, "lengths": -1}, 0.0, 5.0, "it would be outside of all links",
         small=False),
     "rotation": _Measure(
-        "an rpy of {:.4g} rad", 1.57, 0.2, {"rotations": 1}, 0.0, 2.0 * math.pi + 0.01,
+        "an rpy of {} rad", 1.57, 0.2, {"rotations": 1}, 0.0, 2.0 * math.pi + 0.01,
         "no program that writes URDFs turns a frame by more than once round", small=False),
-    "turn": _Measure("a joint that turns by {:.3g} rad", 6.0, 0.25, {"limits of angles": 1},
+    "turn": _Measure("a joint that turns by {} rad", 6.0, 0.25, {"limits of angles": 1},
                      small=False),
-    "slide": _Measure("a joint that slides by {:.3g} m", 0.5, 0.6, {"limits of slides": 1},
+    "slide": _Measure("a joint that slides by {} m", 0.5, 0.6, {"limits of slides": 1},
                       small=False),
 }  # fmt: skip
 
