@@ -37,6 +37,7 @@ autodoc_typehints = "signature"
 napoleon_google_docstring = True
 napoleon_numpy_docstring = False
 napoleon_use_ivar = True
+napoleon_custom_sections = [("Options", "params_style")]  # of commands
 default_role = "code"
 python_use_unqualified_type_names = True
 # What `import picchio` gives stands twice, there and in its stage: a link may lead to either.
