@@ -73,7 +73,7 @@ class Simulation(TableResult):
             "robot": self.robot,
             "records": [record.file for record in self.campaign],
             "channels": list(first.channels),
-            "samples": first.clock.samples,
+            "samples": sum(self.plan.samples),
             "sample_rate": self.plan.sample_rate,
             "effects": [table.model_dump() for table in self.plan.effect],
             "provenance": self.origin,
